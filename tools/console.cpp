@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <csignal>
 #include <cstdio>
 #include <cstdlib>
 #include <fstream>
@@ -50,6 +51,8 @@ void Console::reserve_output() {
     throw UsageError("--json and the output '-' would both be on standard output; name a file");
   if (isatty(STDOUT_FILENO) == 1)
     throw UsageError("standard output is a terminal; redirect it, or name a file");
+  // A reader that goes away is an error with a line, so that other outputs leave nothing behind.
+  std::signal(SIGPIPE, SIG_IGN);
   reserved_ = true;
 }
 

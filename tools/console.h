@@ -33,7 +33,8 @@ class Console {
   explicit Console(OutputMode mode);
 
   /// From now on standard output carries the command's output, and results go to standard error.
-  /// Throws UsageError with --json, and where standard output is a terminal.
+  /// A pipe that its reader closes is a write error from now on. Throws UsageError with --json, and
+  /// where standard output is a terminal.
   void reserve_output();
   /// The command's result, once. Throws Error when it cannot be written.
   void result(const nlohmann::ordered_json& object, std::string_view text);

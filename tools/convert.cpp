@@ -62,8 +62,9 @@ ConvertReport convert_stream(VolumeSource& source, const std::string& out,
 }
 
 int run_convert(const ConvertArguments& arguments, Console& console) {
-  const std::string out =
-      arguments.out.empty() ? stem_of_input(arguments.in) + ".zarr" : arguments.out;
+  const std::string out = arguments.out.empty()
+                              ? stem_of_input(arguments.in, arguments.volume) + ".zarr"
+                              : arguments.out;
   check_store_name(out);
   const auto source = open_input(arguments);
   ConvertOptions options = arguments.store;
@@ -87,8 +88,9 @@ void add_convert(Program& program) {
   add_path(app, "INPUT", arguments->in,
            "Volume of a known format, FILE:/NAME for an array in it, folder of slices, Zarr, raw "
            "file, or - for raw samples on standard input");
-  add_output_or_positional(app, arguments->out, "ZARR", "Store to write, such as OUT.zarr",
-                           "head.zarr of head.nrrd, in the current folder");
+  add_output_or_positional(
+      app, arguments->out, "ZARR", "Store to write, such as OUT.zarr",
+      "head.zarr of head.nrrd, run_data.zarr of run.h5:/data, in the current folder");
   add_volume_options(app, arguments->volume);
   add_region(app, arguments->region);
   add_store_options(app, arguments->store);

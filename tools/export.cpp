@@ -70,7 +70,7 @@ ExportFormat format_of(const std::string& path, std::optional<ExportFormat> opti
 std::string default_output(const ExportArguments& arguments) {
   const ExportFormat format = arguments.format.value_or(
       arguments.isovalues.empty() ? ExportFormat::nrrd : ExportFormat::vdb);
-  return stem_of_input(arguments.input.path) +
+  return stem_of_input(arguments.input.path, arguments.input.volume) +
          std::string(formats()[static_cast<std::size_t>(format)].extensions.front());
 }
 
@@ -98,7 +98,7 @@ int run_export(const ExportArguments& arguments, Console& console) {
   const Box3 box = store_region(store, options.level, arguments.region);
   options.roi = box;
   if (!arguments.isovalues.empty())
-    options.isovalue = resolve_isovalues(arguments.isovalues, store, console.progress()).front();
+    options.isovalue = resolve_isovalues(arguments.isovalues, store, console).front();
   options.half_band = arguments.half_band.value_or(options.half_band);
   export_volume(store, out, options, console.progress());
   if (options.isovalue)

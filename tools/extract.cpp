@@ -145,7 +145,9 @@ void note_band(double isovalue, const StoreInfo& info, Console& console) {
 
 int run_extract(const ExtractArguments& arguments, Console& console) {
   check_arguments(arguments);
-  if (is_standard_output(arguments.output) && !arguments.estimate) console.reserve_output();
+  const bool streams =
+      is_standard_output(arguments.output) || is_standard_output(arguments.preview.path);
+  if (streams && !arguments.estimate) console.reserve_output();
   if (!is_zarr(arguments.input.path)) check_outputs(arguments);
   const OpenedVolume input =
       open_input(arguments.input, arguments.memory, arguments.threads, console);
@@ -211,14 +213,14 @@ void add_level_options(CLI::App* app, ExtractArguments& arguments) {
 void add_outputs(CLI::App* app, ExtractArguments& arguments) {
   add_output(app, arguments.output, "MESH",
              "Mesh to write, .ply, .stl, .obj, .glb, .vtp or .pvtp; several isovalues make "
-             "head_500.ply and so on; - with --format obj for standard output",
+             "head_500.ply and so on; - for standard output",
              "head_500.ply of head.zarr, unless --preview or --estimate is all");
   add_parsed(
       app, arguments.format, parse_mesh_format,
       {"--format", "ply|stl|obj|glb|vtp|pvtp", "Format of the mesh", "by its extension, or ply"});
   add_flag(app, "--quantize", arguments.quantize,
            "GLB with positions and normals of 16 bits (KHR_mesh_quantization)");
-  add_text(app, {"--preview", "PNG", "Draw a shaded picture of the surface"},
+  add_text(app, {"--preview", "PNG", "Draw a shaded picture of the surface; - for standard output"},
            [&preview = arguments.preview.path](const std::string& text) { preview = text; });
   add_picture_size(app, arguments.preview.size);
   add_camera(app, arguments.preview.camera);

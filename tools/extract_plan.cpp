@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include <isobrick/error.h>
+#include "io/bytes/leftovers.h"
 #include "pipeline/program_memory.h"
 #include "tools/format.h"
 #include "tools/isovalues.h"
@@ -30,7 +31,8 @@ fs::path named(const std::string& path, double isovalue, std::size_t count) {
 
 /// The name of the mesh where none is given: the input's in the current folder, with the isovalue.
 fs::path default_output(const ExtractArguments& arguments, MeshFormat format, double isovalue) {
-  return with_isovalue(stem_of_input(arguments.input.path) + std::string(extension_of(format)),
+  return with_isovalue(stem_of_input(arguments.input.path, arguments.input.volume) +
+                           std::string(extension_of(format)),
                        isovalue);
 }
 
@@ -68,7 +70,7 @@ void check_names(const std::vector<ExtractedSurface>& surfaces) {
 std::vector<double> isovalues_of(const ExtractArguments& arguments, const StoreReader& store,
                                  Console& console) {
   if (arguments.isovalues.empty()) {
-    const auto suggested = suggest_isovalue_of(store, console.progress());
+    const auto suggested = suggest_isovalue_of(store, console);
     if (!suggested)
       throw UsageError(
           "--isovalue is missing, and no surface passes between the samples: all are the same, or "
@@ -76,9 +78,11 @@ std::vector<double> isovalues_of(const ExtractArguments& arguments, const StoreR
     throw UsageError(fmt::format("--isovalue is missing; try --isovalue {}: {}", suggested->value,
                                  suggested->why));
   }
-  std::vector<double> isovalues = resolve_isovalues(arguments.isovalues, store, console.progress());
-  if (is_standard_output(arguments.output) && isovalues.size() > 1)
-    throw UsageError("standard output takes one mesh; give one --isovalue, or name a file");
+  std::vector<double> isovalues = resolve_isovalues(arguments.isovalues, store, console);
+  const bool streams =
+      is_standard_output(arguments.output) || is_standard_output(arguments.preview.path);
+  if (streams && isovalues.size() > 1)
+    throw UsageError("standard output takes one surface; give one --isovalue, or name a file");
   return isovalues;
 }
 
@@ -143,6 +147,12 @@ std::vector<ExtractedSurface> surfaces_of_fitting_level(const ExtractArguments& 
   }
 }
 
+/// Where a mesh grows, whose disk must have room; nothing where it only passes through.
+fs::path disk_of(const ExtractedSurface& surface) {
+  if (!is_standard_output(surface.output.native())) return surface.output;
+  return surface.form.format == MeshFormat::obj ? fs::path() : temporary_folder() / "isobrick";
+}
+
 /// The meshes to write, with the size_of(number of a surface) that PlannedMesh has.
 template <class F>
 std::vector<PlannedMesh> planned_meshes(const std::vector<ExtractedSurface>& surfaces,
@@ -150,13 +160,25 @@ std::vector<PlannedMesh> planned_meshes(const std::vector<ExtractedSurface>& sur
   std::vector<PlannedMesh> meshes;
   for (std::size_t i = 0; i < surfaces.size(); ++i) {
     const ExtractedSurface& surface = surfaces[i];
-    if (surface.output.empty() || is_standard_output(surface.output.native())) continue;
+    const fs::path path = disk_of(surface);
+    if (path.empty()) continue;
     PlannedMesh mesh = size_of(i);
-    mesh.path = surface.output;
+    mesh.path = path;
     mesh.form = surface.form;
     meshes.push_back(std::move(mesh));
   }
   return meshes;
+}
+
+/// `waits`: for standard output, in a temporary file.
+std::string shortage_text(const PlannedMesh& mesh, const Shortage& shortage, bool waits) {
+  return fmt::format(
+      "'{}' would have about {} triangles and need {}, but {} has {} free; choose another "
+      "disk{}, a coarser --level or an --roi (or --no-space-check, should the estimate be wrong)",
+      waits ? "-" : mesh.path.string(), human_count(mesh.size.triangles),
+      human_bytes(shortage.needed), waits ? "the disk of temporary files" : "its disk",
+      human_bytes(shortage.free),
+      waits ? fmt::format(" (TMPDIR, now '{}')", mesh.path.parent_path().string()) : "");
 }
 
 /// The least budget of the whole command for a surface with a picture.
@@ -178,6 +200,8 @@ std::uint64_t min_with_picture(const ExtractedSurface& surface, std::size_t surf
 
 void check_arguments(const ExtractArguments& arguments) {
   form_of(arguments);
+  if (is_standard_output(arguments.output) && is_standard_output(arguments.preview.path))
+    throw UsageError("standard output takes a mesh or a picture; name a file for one of them");
   if (!arguments.output.empty() && !arguments.preview.path.empty())
     check_names({{.output = arguments.output, .preview = arguments.preview.path}});
   for (auto request = arguments.isovalues.begin(); request != arguments.isovalues.end(); ++request)
@@ -239,12 +263,8 @@ void check_space(const std::vector<ExtractedSurface>& surfaces, const StoreReade
     return PlannedMesh{.size = guess.mesh, .uncertainty = guess.uncertainty};
   });
   if (const auto shortage = find_shortage(likely, free_space))
-    throw Error(fmt::format(
-        "'{}' would have about {} triangles and need {}, but its disk has {} free; choose "
-        "another disk, a coarser --level or an --roi (or --no-space-check, should the estimate "
-        "be wrong)",
-        likely[shortage->mesh].path.string(), human_count(likely[shortage->mesh].size.triangles),
-        human_bytes(shortage->needed), human_bytes(shortage->free)));
+    throw Error(shortage_text(likely[shortage->mesh], *shortage,
+                              is_standard_output(surfaces.front().output.native())));
 }
 
 /// Refuses a budget in which pictures cannot be drawn, before anything is extracted.

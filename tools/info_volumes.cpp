@@ -67,6 +67,7 @@ ordered_json json_of(const std::filesystem::path& path, const MetadataFiles& fil
   for (std::size_t i = 0; i < files.levels.size(); ++i)
     object["levels"].push_back({{"extent", to_json(extent_of(files.levels[i].array))},
                                 {"spacing", to_json(files.image.levels[i].transform.spacing)}});
+  object["peak_resident_bytes"] = peak_resident_bytes();
   return object;
 }
 

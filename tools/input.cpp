@@ -70,7 +70,8 @@ OpenedVolume open_input(const InputArguments& input, std::uint64_t memory, int t
                            .cache = input.cache,
                            .needs_ranges = needs_ranges,
                            .memory = memory,
-                           .threads = threads},
+                           .threads = threads,
+                           .on_note = [&](const std::string& note) { console.note(note); }},
                           console.progress());
     } catch (const UsageError&) {
       refuse_folder_of_zarr(input.path);
@@ -78,7 +79,6 @@ OpenedVolume open_input(const InputArguments& input, std::uint64_t memory, int t
     }
   }();
   set_interrupt_note({});
-  for (const std::string& note : opened.notes()) console.note(note);
   return opened;
 }
 

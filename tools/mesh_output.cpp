@@ -14,8 +14,7 @@ namespace isobrick::tools {
 namespace fs = std::filesystem;
 
 MeshFormat mesh_format(const fs::path& path) {
-  if (is_standard_output(path.native()))
-    throw UsageError("standard output has no name with a format: add --format obj");
+  if (is_standard_output(path.native())) return MeshFormat::ply;
   if (const auto format = find_mesh_format(path.extension().string())) return *format;
   throw UsageError(
       fmt::format("'{}' is no mesh that can be written; name it .ply, .stl, .obj, .glb, .vtp or "
@@ -26,11 +25,10 @@ MeshFormat mesh_format(const fs::path& path) {
 void check_mesh_name(const fs::path& path, MeshFormat format) {
   const std::string_view extension = isobrick::extension_of(format);
   if (is_standard_output(path.native())) {
-    if (format == MeshFormat::obj) return;
+    if (format != MeshFormat::pvtp) return;
     throw UsageError(
-        fmt::format("{} cannot go to standard output, because its beginning is written last: "
-                    "name a file, or add --format obj",
-                    name_of(format)));
+        "PVTP has several files, which standard output cannot take: name a file, or add --format "
+        "vtp");
   }
   const std::string_view extensions[] = {extension};
   refuse_misleading_name(path.string(), extensions,

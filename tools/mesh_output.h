@@ -15,10 +15,10 @@ struct MeshForm {
   bool quantize = false;  ///< 16 bits a number; GLB only
 };
 
-/// By the name's extension. Throws UsageError for any other.
+/// By the name's extension; PLY on standard output. Throws UsageError for any other.
 MeshFormat mesh_format(const std::filesystem::path& path);
 /// Throws UsageError where the name has the extension of another format, or standard output where
-/// that cannot be streamed.
+/// that has several files.
 void check_mesh_name(const std::filesystem::path& path, MeshFormat format);
 /// By a word such as "ply". Throws UsageError for any other.
 MeshFormat parse_mesh_format(const std::string& text);

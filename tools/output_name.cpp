@@ -29,6 +29,13 @@ std::string extension_of_folder(std::string_view path) {
   return extension_of(path);
 }
 
+/// A name of an array or a grid, without what has a meaning in paths.
+std::string as_file_name(std::string name) {
+  for (char& c : name)
+    if (c == '/' || static_cast<unsigned char>(c) < ' ') c = '_';
+  return name;
+}
+
 }  // namespace
 
 void refuse_misleading_name(const std::string& path, std::span<const std::string_view> own,
@@ -39,8 +46,7 @@ void refuse_misleading_name(const std::string& path, std::span<const std::string
 }
 
 void check_picture_name(const std::string& path) {
-  if (is_standard_output(path))
-    throw UsageError("this picture cannot go to standard output; name it .png");
+  if (is_standard_output(path)) return;
   const std::string extension = extension_of(path);
   if (!extension.empty() && extension != ".png")
     throw UsageError(
@@ -67,9 +73,15 @@ void check_can_write(const std::filesystem::path& path, bool force) {
         fmt::format("cannot create '{}': there is no folder '{}'", path.string(), folder.string()));
 }
 
-std::string stem_of_input(const std::string& path) {
+std::string stem_of_input(const std::string& path, const VolumeRequest& request) {
   if (path == "-") throw UsageError("standard input has no name; name the output with -o");
-  return volume_stem(path);
+  std::string stem = volume_stem(path);
+  if (const std::string inner = split_volume_path(path).inner; !inner.empty())
+    stem += "_" + as_file_name(inner);
+  if (request.grid) stem += "_" + as_file_name(*request.grid);
+  if (request.selection.channel) stem += fmt::format("_c{}", *request.selection.channel);
+  if (request.selection.time) stem += fmt::format("_t{}", *request.selection.time);
+  return stem;
 }
 
 }  // namespace isobrick::tools

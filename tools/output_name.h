@@ -5,6 +5,8 @@
 #include <string>
 #include <string_view>
 
+#include <isobrick/volume_request.h>
+
 // Names of outputs: none may have the extension of another format.
 namespace isobrick::tools {
 
@@ -16,7 +18,8 @@ inline bool is_standard_output(std::string_view path) { return path == "-"; }
 void refuse_misleading_name(const std::string& path, std::span<const std::string_view> own,
                             std::string_view instead);
 
-/// Throws UsageError for a picture that is not named .png, nor without extension.
+/// Throws UsageError for a picture that is neither named .png, nor without extension, nor on
+/// standard output.
 void check_picture_name(const std::string& path);
 
 /// Throws UsageError for a store that is named as a file of a known format, or `-`.
@@ -26,8 +29,9 @@ void check_store_name(const std::string& path);
 /// exist. Standard output can always be written.
 void check_can_write(const std::filesystem::path& path, bool force);
 
-/// What outputs of an input are called where no name is given: volume_stem(). Throws UsageError for
-/// standard input, which has no name.
-std::string stem_of_input(const std::string& path);
+/// What outputs of an input are called where no name is given: volume_stem() and, of several
+/// volumes in it, the one that is chosen: "run_data_t" of run.h5:/data/t, "x_density" of a grid,
+/// "x_c1_t3" of a channel and a time. Throws UsageError for standard input, which has no name.
+std::string stem_of_input(const std::string& path, const VolumeRequest& request = {});
 
 }  // namespace isobrick::tools

@@ -69,10 +69,8 @@ void check_memory(const MeshPictureRequest& request, std::uint64_t memory) {
 int run_render(const RenderArguments& given, Console& console) {
   RenderArguments arguments = given;
   if (arguments.output.empty()) arguments.output = stem_of_input(arguments.meshes.front()) + ".png";
-  if (is_standard_output(arguments.output))
-    console.reserve_output();
-  else
-    check_picture_name(arguments.output);
+  if (is_standard_output(arguments.output)) console.reserve_output();
+  check_picture_name(arguments.output);
   const MeshPictureRequest request = request_of(arguments);
   check_memory(request, arguments.memory);
   check_replaces_no_input(arguments.output, input_paths(arguments.meshes));

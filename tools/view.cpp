@@ -13,6 +13,7 @@
 #include "bricks/zarr/metadata_files.h"
 #include "io/bytes/output_file.h"
 #include "io/bytes/output_guard.h"
+#include "io/volumes/open/volume_format.h"
 #include "tools/format.h"
 #include "tools/input.h"
 #include "tools/interrupt.h"
@@ -96,9 +97,8 @@ void set_region(const StoreReader& store, const ViewArguments& arguments, ViewSe
 /// The isovalues that are requested or, if none is, one to begin with.
 std::vector<double> isovalues_of(const ViewArguments& arguments, const StoreReader& store,
                                  Console& console) {
-  if (!arguments.isovalues.empty())
-    return resolve_isovalues(arguments.isovalues, store, console.progress());
-  const auto suggested = suggest_isovalue_of(store, console.progress());
+  if (!arguments.isovalues.empty()) return resolve_isovalues(arguments.isovalues, store, console);
+  const auto suggested = suggest_isovalue_of(store, console);
   return suggested ? std::vector{suggested->value} : std::vector<double>{};
 }
 
@@ -195,6 +195,7 @@ ScreenshotReport draw_shots(SceneRenderer& picture, const std::vector<Screenshot
 
 /// Draws into files.
 int draw(const ViewArguments& arguments, Console& console) {
+  if (is_standard_output(arguments.screenshot)) console.reserve_output();
   const OpenedVolume input =
       open_input(arguments.input, arguments.budgets.memory, arguments.budgets.threads, console);
   const auto store = std::make_shared<const StoreReader>(input.store().info().path,
@@ -278,6 +279,7 @@ int run_view(const ViewArguments& arguments, Console& console) {
   options.height = arguments.picture.size.height;
   options.budgets = arguments.budgets;
   options.index = arguments.index();
+  options.cache = arguments.input.cache;
   options.camera = arguments.picture.camera;
   // An input that cannot be opened is reported before anything about windows.
   std::optional<OpenedVolume> input;
@@ -293,13 +295,18 @@ int run_view(const ViewArguments& arguments, Console& console) {
     ViewerWindow window(options);
     if (input) {
       const StoreInfo& info = input->store().info();
-      window.open(info.path, info.path == arguments.input.path ? arguments.input.volume.selection
-                                                               : info.selection);
+      window.open(
+          info.path,
+          info.path == arguments.input.path ? arguments.input.volume.selection : info.selection,
+          std::filesystem::path(split_volume_path(arguments.input.path).file).filename().string());
     }
     window.run();
   }  // a conversion that still ran has left nothing
   if (const int signal = interrupting_signal(); signal != 0) throw Interrupted(signal);
-  console.result({{"command", "view"}, {"input", arguments.input.path}}, "");
+  console.result({{"command", "view"},
+                  {"input", arguments.input.path},
+                  {"peak_resident_bytes", peak_resident_bytes()}},
+                 "");
   return 0;
 }
 
@@ -322,7 +329,9 @@ void parse_slice(const std::string& text, ViewSettings& settings) {
 }
 
 void add_what_to_draw(CLI::App* app, ViewArguments& arguments) {
-  add_text(app, {"--screenshot", "PNG", "Draw into this file, without a window or a display"},
+  add_text(app,
+           {"--screenshot", "PNG",
+            "Draw into this file, - for standard output, without a window or a display"},
            [&](const std::string& text) { arguments.screenshot = text; });
   add_text(app,
            {"--turntable", "DIR", "Draw a full turn into DIR/0000.png and so on, without a window"},

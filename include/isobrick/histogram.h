@@ -63,4 +63,10 @@ std::optional<double> otsu(const Histogram& histogram);
 /// more than 100.
 std::optional<double> percentile(const Histogram& histogram, double percent);
 
+/// The smallest or the largest sample if it lies so far from all others that these share a few
+/// bins, as values that stand for missing samples do (-9999, -1e30). otsu() and percentile() are
+/// no better than these bins are wide. nullopt where there is none, and of integers in bins of
+/// width 1, which are exact.
+std::optional<double> far_value(const Histogram& histogram);
+
 }  // namespace isobrick

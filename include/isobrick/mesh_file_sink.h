@@ -39,8 +39,9 @@ struct MeshFileOptions {
 };
 
 /// Opens a mesh file for extract(). It has its name once it is finished; a sink that is destroyed
-/// before leaves nothing. Throws UsageError when the file exists and `force` is not set or its name
-/// has no known extension, Error when it cannot be made.
+/// before leaves nothing. The name "-" is standard output, which is written to once the mesh is
+/// finished, of OBJ sooner; PVTP cannot go there. Throws UsageError when the file exists and
+/// `force` is not set or its name has no known extension, Error when it cannot be made.
 std::unique_ptr<MeshSink> create_mesh_file(const std::filesystem::path& path,
                                            const MeshFileOptions& options);
 

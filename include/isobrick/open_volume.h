@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -33,6 +34,9 @@ struct OpenOptions {
   bool needs_ranges = true;
   std::uint64_t memory = std::uint64_t{1} << 30;  ///< budget of the conversion, bytes
   int threads = 0;                                ///< 0: all cores
+  /// Called with each of OpenedVolume::notes() when it comes up, which is before a conversion
+  /// begins; from the thread that opens. May be empty.
+  std::function<void(const std::string&)> on_note;
 };
 
 /// A volume that can be read as a store, whatever its format.
@@ -54,7 +58,8 @@ class OpenedVolume {
   const StoreReader& store() const;
   /// Whether it was converted just now.
   bool converted() const;
-  /// Remarks for the user, a sentence each: where the store is kept, and those of the source.
+  /// Remarks for the user, a sentence each: that there is a conversion and where its store is kept,
+  /// and those of the source.
   const std::vector<std::string>& notes() const;
 
  private:

@@ -1,7 +1,9 @@
 #pragma once
 
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <string_view>
 #include <type_traits>
@@ -77,6 +79,13 @@ constexpr bool is_floating(ScalarType type) {
 constexpr ScalarType type_with_nan(ScalarType type) {
   if (is_floating(type)) return type;
   return type == ScalarType::u32 || type == ScalarType::i32 ? ScalarType::f64 : ScalarType::f32;
+}
+
+/// `value` as samples of the type hold it: -1e30 is no float, and the nearest one is meant. A
+/// number beyond all floats stays, and no sample has it.
+inline double as_sample(double value, ScalarType type) {
+  const bool fits = std::abs(value) <= static_cast<double>(std::numeric_limits<float>::max());
+  return type == ScalarType::f32 && fits ? static_cast<double>(static_cast<float>(value)) : value;
 }
 
 /// "u8", "i16", "f32", …: the names of the command line.

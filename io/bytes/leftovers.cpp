@@ -110,6 +110,14 @@ bool remove_if_left(const fs::path& path, bool whole_folders) {
 
 }  // namespace
 
+fs::path temporary_folder() {
+  std::error_code failure;
+  fs::path folder = fs::temp_directory_path(failure);
+  if (failure)
+    throw Error("there is no folder for temporary files; set TMPDIR to one: " + failure.message());
+  return folder;
+}
+
 Temporary create_temporary_file(const std::string& path) {
   // O_EXCL: never through a link that somebody else put there.
   return create_beside(path, [](const char* name) {

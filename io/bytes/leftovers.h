@@ -1,5 +1,6 @@
 #pragma once
 
+#include <filesystem>
 #include <string>
 #include <string_view>
 
@@ -15,6 +16,9 @@ struct Temporary {
   UniqueFd fd;
   std::string path;
 };
+
+/// The folder of temporary files, $TMPDIR or /tmp. Throws Error where it is none.
+std::filesystem::path temporary_folder();
 
 /// Creates a file that only this call can have made. Throws Error.
 Temporary create_temporary_file(const std::string& path);

@@ -161,8 +161,12 @@ void check_output(const std::string& path, bool force) {
   if (!force) throw UsageError(fmt::format("'{}' exists already; add --force to replace it", path));
 }
 
-OutputFile::OutputFile(std::string path, bool force)
-    : path_(std::move(path)), force_(force), writer_([this] {
+OutputFile::OutputFile(std::string path, bool force, Streaming streaming)
+    : path_(std::move(path)),
+      force_(force),
+      waits_(path_ == kStandardOutput && streaming == Streaming::when_complete),
+      writer_([this] {
+        if (waits_) return open_scratch_beside(path_);
         if (path_ == kStandardOutput) return open_standard_output();
         // First: what a killed process left goes also where the output stays as it is.
         if (!path_.empty()) remove_leftovers(path_);
@@ -176,7 +180,16 @@ OutputFile::~OutputFile() {
   if (!temporary_.empty()) ::unlink(temporary_.c_str());
 }
 
+void OutputFile::copy_to_standard_output() {
+  // Only a look: a reader that does not take what is written must not hold up other outputs.
+  { const Publication turn; }
+  FileWriter out = open_standard_output();
+  out.append_file(writer_);
+  out.finish();
+}
+
 void OutputFile::publish() {
+  if (waits_) copy_to_standard_output();
   writer_.finish();
   const Publication turn;
   if (path_ == kStandardOutput) return;
@@ -192,11 +205,11 @@ void OutputFile::publish() {
 }
 
 FileWriter open_scratch_beside(const std::string& path, std::size_t memory) {
-  Temporary temporary = create_temporary_file(
-      path == kStandardOutput ? (std::filesystem::temp_directory_path() / "isobrick").string()
-                              : path);
+  const bool beside = path != kStandardOutput;
+  const auto named = beside ? std::filesystem::path(path) : temporary_folder();
+  Temporary temporary = create_temporary_file((beside ? named : named / "isobrick").string());
   ::unlink(temporary.path.c_str());
-  return FileWriter({std::move(temporary.fd), path}, memory);
+  return FileWriter({std::move(temporary.fd), named}, memory);
 }
 
 }  // namespace isobrick

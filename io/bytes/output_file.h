@@ -68,9 +68,14 @@ class FileWriter {
   std::uint64_t written_ = 0;
 };
 
-/// The name of an output that goes to standard output as it is written. There is nothing to
-/// replace then, and nothing that was written can be read back or patched.
+/// The name of an output that goes to standard output. There is nothing to replace then.
 inline constexpr std::string_view kStandardOutput = "-";
+
+/// When an output named kStandardOutput is written.
+enum class Streaming : std::uint8_t {
+  as_written,     ///< at once; nothing can be read back or patched
+  when_complete,  ///< by publish(), out of a nameless file in the folder of temporary files
+};
 
 /// Throws UsageError when `path` exists and `force` is not set, and when it is neither a regular
 /// file nor a link to one.
@@ -85,7 +90,7 @@ void check_output(const std::string& path, bool force);
 class OutputFile {
  public:
   /// Throws as check_output() does, and Error when its folder cannot be written to.
-  OutputFile(std::string path, bool force);
+  OutputFile(std::string path, bool force, Streaming streaming = Streaming::as_written);
   ~OutputFile();
   OutputFile(const OutputFile&) = delete;
   OutputFile& operator=(const OutputFile&) = delete;
@@ -96,13 +101,17 @@ class OutputFile {
   /// Where it is until it is published, for a reader that checks it.
   const std::string& temporary_path() const { return temporary_; }
 
-  /// Flushes and renames. Replaces a file that appeared in the meantime only with `force`.
+  /// Flushes and renames. Replaces a file that appeared in the meantime only with `force`. Copies
+  /// to standard output what waits for that.
   /// Throws Cancelled when an end was requested.
   void publish();
 
  private:
+  void copy_to_standard_output();
+
   std::string path_;
   bool force_;
+  bool waits_ = false;     ///< for publish() to copy it to standard output
   std::string temporary_;  ///< empty once published
   FileWriter writer_;
 };

@@ -40,6 +40,7 @@ void check_folder(const fs::path& folder, bool replace) {
 
 /// The folders that will be removed when the output is whole; throws when one must stay.
 std::vector<fs::path> earlier_folders(const std::string& path, bool force) {
+  if (path == kStandardOutput) return {};
   const bool killed = remove_leftovers(path);
   remove_leftovers(part_folder(path, 1).string());
   std::vector<fs::path> folders = part_folders(path);
@@ -62,7 +63,7 @@ fs::path free_folder(const fs::path& path) {
 PartedOutput::PartedOutput(std::string path, bool force)
     : earlier_(earlier_folders(path, force)),
       folder_(free_folder(path)),
-      index_(std::move(path), force) {}
+      index_(std::move(path), force, Streaming::when_complete) {}
 
 PartedOutput::~PartedOutput() {
   std::error_code ignored;
@@ -70,6 +71,10 @@ PartedOutput::~PartedOutput() {
 }
 
 FileWriter PartedOutput::create_part(std::string_view extension) {
+  if (index_.path() == kStandardOutput)
+    throw UsageError(
+        "the mesh needs several files, which standard output cannot take; name a file, or choose "
+        "the format PLY");
   if (temporary_.path.empty())
     temporary_ = create_temporary_folder(part_folder(index_.path(), 1).string());
   const fs::path path = fs::path(temporary_.path) / fmt::format("part_{}{}", parts_, extension);
@@ -84,6 +89,7 @@ std::string PartedOutput::reference(std::size_t part, std::string_view extension
 }
 
 void PartedOutput::publish() {
+  if (index_.path() == kStandardOutput) return index_.publish();
   const Publication turn;
   if (parts_ > 0) {
     if (const int failure = rename_no_replace(temporary_.path, folder_); failure != 0)

@@ -31,7 +31,8 @@ class PartedOutput {
   OutputFile& index() { return index_; }
   const OutputFile& index() const { return index_; }
 
-  /// Creates the next part; `extension` with its dot. It must be flushed before publish().
+  /// Creates the next part; `extension` with its dot. It must be flushed before publish(). Throws
+  /// UsageError on standard output, which takes one file.
   FileWriter create_part(std::string_view extension);
   std::size_t parts() const { return parts_; }
   /// How the file names a part, relative to its own folder: head.pvtp.parts/part_0.vtp.

@@ -29,7 +29,7 @@ void append_faces(FileWriter& out, std::span<const Triangle> triangles) {
 
 PlySink::PlySink(std::string path, bool force, std::size_t memory)
     : memory_(memory),
-      out_(std::move(path), force),
+      out_(std::move(path), force, Streaming::when_complete),
       faces_(open_scratch_beside(out_.path(), memory)) {}
 
 /// Always of the same length, so that it can be replaced when the counts are

@@ -33,7 +33,8 @@ Vec3f facet_normal(Vec3f a, Vec3f b, Vec3f c) {
 
 }  // namespace
 
-StlSink::StlSink(std::string path, bool force) : out_(std::move(path), force) {}
+StlSink::StlSink(std::string path, bool force)
+    : out_(std::move(path), force, Streaming::when_complete) {}
 
 void StlSink::begin(const MeshHeader&) {
   // Must not begin with "solid": readers take such files for text.

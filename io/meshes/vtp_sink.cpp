@@ -18,6 +18,10 @@ constexpr std::string_view kPartExtension = ".vtp";
 
 /// Refuses a name that the index could not hold, before anything is created.
 std::string named_in_xml(std::string path) {
+  if (path == kStandardOutput)
+    throw UsageError(
+        "a .pvtp has several files, which standard output cannot take; name a file, or choose the "
+        "format VTP");
   const std::string name = std::filesystem::path(path).filename().string();
   if (!is_xml_text(name))
     throw UsageError(fmt::format(
@@ -38,7 +42,7 @@ void append_column(FileWriter& out, std::span<const std::byte> rows, std::size_t
 }  // namespace
 
 VtpSink::VtpSink(std::string path, bool force)
-    : out_(std::move(path), force),
+    : out_(std::move(path), force, Streaming::when_complete),
       normals_(open_scratch_beside(out_.path())),
       triangles_(open_scratch_beside(out_.path())) {}
 

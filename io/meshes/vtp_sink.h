@@ -36,7 +36,7 @@ class VtpSink final : public MeshSink {
 class PvtpSink final : public PartedMeshSink {
  public:
   /// See PartedOutput for what `path` and `force` may throw. UsageError also for
-  /// a name that XML cannot hold: not UTF-8, or with control characters.
+  /// a name that XML cannot hold, not UTF-8 or with control characters, and for standard output.
   PvtpSink(std::string path, bool force, std::uint64_t part_triangles = kPartTriangles);
 
   void finish() override;

@@ -103,9 +103,11 @@ class SubsampledSource final : public VolumeSource {
 class NodataSource final : public VolumeSource {
  public:
   NodataSource(std::unique_ptr<VolumeSource> stored, double nodata)
-      : stored_(std::move(stored)), nodata_(nodata), info_(stored_->info()) {
+      : stored_(std::move(stored)),
+        nodata_(as_sample(nodata, stored_->info().type)),
+        info_(stored_->info()) {
     info_.type = type_with_nan(info_.type);
-    if (info_.fill_value == nodata) info_.fill_value = std::numeric_limits<double>::quiet_NaN();
+    if (info_.fill_value == nodata_) info_.fill_value = std::numeric_limits<double>::quiet_NaN();
   }
 
   const VolumeInfo& info() const override { return info_; }

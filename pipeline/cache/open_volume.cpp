@@ -112,7 +112,7 @@ std::string key_of(const std::string& path, const VolumeInfo& info, const Volume
 class TemporaryFolder {
  public:
   TemporaryFolder() {
-    const std::string name = (fs::temp_directory_path() / "isobrick").string();
+    const std::string name = (temporary_folder() / "isobrick").string();
     remove_leftovers(name, true);
     folder_ = create_temporary_folder(name);
   }
@@ -166,16 +166,12 @@ struct OpenedVolume::Impl {
       fill_temporary(path, *source, options, progress);
     else
       fill_entry(path, *source, options, progress);
-    if (converted && in_place)
-      notes.push_back(fmt::format("without that copy: '{}' adds what it lacks in place",
-                                  "isobrick index " + shell_word(path)));
   }
 
   void fill_temporary(const std::string& path, VolumeSource& source, const OpenOptions& options,
                       Progress& progress) {
     temporary.emplace();
-    notes.push_back(fmt::format("'{}' was converted to a temporary store", path));
-    convert_to(temporary->store(), source, options, progress);
+    convert_to(temporary->store(), "a temporary store", path, source, options, progress);
     store.emplace(temporary->store());
   }
 
@@ -189,10 +185,9 @@ struct OpenedVolume::Impl {
       return fill_temporary(path, source, options, progress);
     }
     if (!entry->is_filled()) {
-      notes.push_back(
-          fmt::format("'{}' was converted to '{}' and kept there", path, entry->store().string()));
       entry->clear();
-      convert_to(entry->store(), source, options, progress);
+      convert_to(entry->store(), fmt::format("the cache ('{}')", entry->store().string()), path,
+                 source, options, progress);
       if (key_of(path, source.info(), options.volume) != key)
         throw Error(
             fmt::format("'{}' changed while it was converted; run the command again", path));
@@ -203,8 +198,18 @@ struct OpenedVolume::Impl {
     store.emplace(entry->store());
   }
 
-  void convert_to(const fs::path& out, VolumeSource& source, const OpenOptions& options,
-                  Progress& progress) {
+  void add_note(const OpenOptions& options, std::string note) {
+    notes.push_back(std::move(note));
+    if (options.on_note) options.on_note(notes.back());
+  }
+
+  /// `place` is what messages call `out`.
+  void convert_to(const fs::path& out, const std::string& place, const std::string& path,
+                  VolumeSource& source, const OpenOptions& options, Progress& progress) {
+    add_note(options, fmt::format("converting '{}' into {}", path, place));
+    if (is_zarr(path) && takes_all(options.volume))
+      add_note(options, fmt::format("without that copy: '{}' adds what it lacks in place",
+                                    "isobrick index " + shell_word(path)));
     std::error_code none;
     ConvertOptions convert_options;
     convert_options.memory = options.memory;
@@ -213,7 +218,7 @@ struct OpenedVolume::Impl {
     convert_options.resume = fs::exists(staging_path(out), none);
     convert(source, out, convert_options, progress);
     converted = true;
-    for (std::string& note : source.notes()) notes.push_back(std::move(note));
+    for (std::string& note : source.notes()) add_note(options, std::move(note));
   }
 };
 

@@ -85,6 +85,21 @@ std::optional<double> otsu(const Histogram& h) {
   return value_at(h, static_cast<double>(best) + middle);
 }
 
+std::optional<double> far_value(const Histogram& h) {
+  // Of so many bins the others may take one.
+  constexpr std::ptrdiff_t few = 256;
+  const auto bins = std::ssize(h.counts);
+  if (bins < few || (h.whole_numbers && h.bin_width == 1)) return std::nullopt;
+  const auto has_samples = [](std::uint64_t n) { return n > 0; };
+  const auto above =
+      std::find_if(h.counts.begin() + 1, h.counts.end(), has_samples) - h.counts.begin();
+  if (bins - above <= bins / few) return h.lo;
+  const auto below =
+      std::find_if(h.counts.rbegin() + 1, h.counts.rend(), has_samples) - h.counts.rbegin();
+  if (bins - below <= bins / few) return h.hi;
+  return std::nullopt;
+}
+
 std::optional<double> percentile(const Histogram& h, double percent) {
   if (h.counts.empty() || !(percent >= 0 && percent <= 100)) return std::nullopt;
   const double rank = static_cast<double>(sum_of(h)) * (percent / 100);

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <numeric>
 #include <random>
 
@@ -153,6 +154,23 @@ TEST(Rebin, KeepsEverySample) {
   }
   EXPECT_EQ(rebin(make(3, 1, true, {1, 2, 3, 4, 5}), 2).counts, (std::vector<std::uint64_t>{6, 9}));
   EXPECT_TRUE(rebin(make(3, 1, true, {}), 2).counts.empty());
+}
+
+TEST(Histogram, AValueFarFromAllOthers) {
+  std::vector<std::uint64_t> counts(40000);
+  counts.front() = 7;
+  counts.back() = 1000;
+  counts[counts.size() - 100] = 5;
+  const Histogram low = make(-1e4, 0.25, false, counts);
+  EXPECT_EQ(far_value(low), -1e4);
+  EXPECT_EQ(far_value(make(-1e4, 2, true, counts)), -1e4);
+  EXPECT_EQ(far_value(make(0, 1, true, counts)), std::nullopt) << "each value has a bin";
+  std::reverse(counts.begin(), counts.end());
+  EXPECT_EQ(far_value(make(0, 0.25, false, counts)), 1e4);
+  counts[20000] = 1;
+  EXPECT_EQ(far_value(make(0, 0.25, false, counts)), std::nullopt);
+  EXPECT_EQ(far_value(make(0, 0.25, false, {1, 0, 0, 9})), std::nullopt);
+  EXPECT_EQ(far_value(Histogram()), std::nullopt);
 }
 
 }  // namespace

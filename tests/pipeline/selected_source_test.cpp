@@ -139,5 +139,22 @@ TEST(SelectedSource, WhatSelectsAllIsTheSourceItself) {
   EXPECT_EQ(select_samples(std::move(source), {}).get(), before);
 }
 
+TEST(SelectedSource, MissingFloatsAreThoseOfTheNearestNumber) {
+  const Int3 extent{4, 1, 1};
+  const std::vector<float> values{1, -1e30F, 0.1F, 2};
+  for (const auto& [nodata, missing] :
+       {std::pair{-1e30, 1}, std::pair{0.1, 2}, std::pair{1e300, -1}}) {
+    std::vector<std::byte> bytes(sizeof(float) * values.size());
+    std::memcpy(bytes.data(), values.data(), bytes.size());
+    VolumeRequest request;
+    request.nodata = nodata;
+    const auto source = select_samples(
+        std::make_unique<MemorySource>(extent, ScalarType::f32, std::move(bytes), true), request);
+    const std::vector<float> read = read_all<float>(*source, 1);
+    for (int i = 0; i < 4; ++i)
+      EXPECT_EQ(std::isnan(read[static_cast<std::size_t>(i)]), i == missing) << nodata;
+  }
+}
+
 }  // namespace
 }  // namespace isobrick::test

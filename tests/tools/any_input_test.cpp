@@ -43,12 +43,27 @@ TEST_F(AnyInput, AMeshIsThatOfTheConvertedStore) {
     const std::string expected = mesh(path("a.zarr"));
     EXPECT_EQ(err_, "");
     EXPECT_TRUE(mesh(input) == expected);
-    EXPECT_NE(err_.find("was converted to"), std::string::npos) << err_;
+    EXPECT_NE(err_.find("converting '" + input + "' into the cache"), std::string::npos) << err_;
     EXPECT_TRUE(mesh(input) == expected);
     EXPECT_EQ(err_, "") << "the store was kept";
     EXPECT_TRUE(mesh(input, {"--cache", "none"}) == expected);
     EXPECT_NE(err_.find("temporary store"), std::string::npos) << err_;
   }
+}
+
+TEST_F(AnyInput, TheConversionIsAnnouncedBeforeItBegins) {
+  const Arguments extract{"extract", nrrd(), "--isovalue", "127.5", "-o", path("m.ply"), "--force"};
+  const auto with = [&](const Arguments& more) {
+    Arguments arguments = extract;
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return arguments;
+  };
+  const std::string err = run(with({"--progress", "lines"})).err;
+  const std::size_t note = err.find("converting '" + path("scan.nrrd") + "' into the cache");
+  ASSERT_NE(note, std::string::npos) << err;
+  EXPECT_LT(note, err.find(" %")) << err;
+  EXPECT_EQ(err.find("converting", note + 1), std::string::npos) << err;
+  EXPECT_EQ(run(with({"--spacing", "1,1,1", "--quiet"})).err, "");
 }
 
 TEST_F(AnyInput, ExportInfoAndView) {
@@ -100,7 +115,7 @@ TEST_F(AnyInput, OutputsAreCheckedBeforeAConversion) {
         Arguments{"export", raw(), path("none/m.raw")}}) {
     const Outcome outcome = run(arguments);
     EXPECT_NE(outcome.exit_code, 0);
-    EXPECT_EQ(outcome.err.find("was converted"), std::string::npos) << outcome.err;
+    EXPECT_EQ(outcome.err.find("converting"), std::string::npos) << outcome.err;
   }
   EXPECT_EQ(read_file(path("m.ply")), "mine");
 }

@@ -96,5 +96,24 @@ TEST_F(IsovalueOption, ARegionOfTheWorldIsABoxOfSamples) {
                  {"does not touch"});
 }
 
+TEST_F(IsovalueOption, AFarFillValueIsNamedAndCanBeLeftOut) {
+  std::vector<float> samples(20 * 20 * 20);
+  for (std::size_t i = 0; i < samples.size(); ++i)
+    samples[i] = i % 20 < 3 ? -1e30F : static_cast<float>(i % 1000) / 1000;
+  const std::string file = path("far_20x20x20_float32.raw");
+  write_file(file, std::string(reinterpret_cast<const char*>(samples.data()),
+                               samples.size() * sizeof(float)));
+  const Arguments extract{"extract", file, "--isovalue", "p50", "--estimate"};
+  const std::string err = run(extract).err;
+  EXPECT_NE(err.find("add --nodata -1e+30"), std::string::npos) << err;
+  Arguments without = extract;
+  without.insert(without.end(), {"--nodata", "-1e+30"});
+  const Outcome outcome = run(without);
+  EXPECT_EQ(outcome.err.find("--nodata"), std::string::npos) << outcome.err;
+  const std::vector<double> median = isovalues(file, {"--isovalue", "p50", "--nodata", "-1e+30"});
+  ASSERT_EQ(median.size(), 1u);
+  EXPECT_NEAR(median[0], 0.5, 0.05);
+}
+
 }  // namespace
 }  // namespace isobrick::test

@@ -16,7 +16,7 @@ class OutputName : public ProgramTest {
     write_file(path("stream"), "");
     const Outcome outcome = run(arguments, {.output = path("stream")});
     EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
-    EXPECT_NE(outcome.err.find("-: "), std::string::npos) << outcome.err;
+    EXPECT_NE(outcome.err.find('-'), std::string::npos) << outcome.err;
     std::string bytes = read_file(path("stream"));
     fs::remove(path("stream"));
     return bytes;
@@ -72,10 +72,7 @@ TEST_F(OutputName, OfAPictureIsPng) {
   expect_refused(render, 2, {"b.jpg", ".png"});
   expect_refused(run({"extract", store_, "--isovalue", "128", "--preview", path("b.jpg")}), 2,
                  {"b.jpg", ".png"});
-  expect_refused(run({"extract", store_, "--isovalue", "128", "--preview", "-"}), 2,
-                 {"standard output", ".png"});
   expect_refused(run({"view", store_, "--screenshot", path("b.tif")}), 2, {"b.tif", ".png"});
-  expect_refused(run({"view", store_, "--screenshot", "-"}), 2, {"standard output", ".png"});
   EXPECT_EQ(files(), (std::vector<std::string>{"a.zarr", "m.ply"}));
 }
 
@@ -100,9 +97,11 @@ TEST_F(OutputName, OfAMeshSaysWhatIsWritten) {
   };
   expect_refused(run(with({path("x.stl"), "--format", "ply"})), 2, {"x.stl", "ply"});
   expect_refused(run(with({path("x.png"), "--format", "ply"})), 2, {"x.png", "ply"});
-  expect_refused(run(with({"-"})), 2, {"standard output", "--format obj"});
-  expect_refused(run(with({"-", "--format", "ply"})), 2, {"PLY", "standard output"});
-  expect_refused(run(with({"-", "--format", "obj", "--isovalue", "9"})), 2, {"one"});
+  expect_refused(run(with({"-", "--format", "pvtp"})), 2, {"PVTP", "standard output"});
+  for (const char* format : {"obj", "ply"})
+    expect_refused(run(with({"-", "--format", format, "--isovalue", "9"})), 2, {"one"});
+  expect_refused(run(with({"-", "--preview", "-"})), 2, {"standard output", "picture"});
+  expect_refused(run({"extract", store_, "--isovalue", "9,128", "--preview", "-"}), 2, {"one"});
   EXPECT_EQ(files(), (std::vector<std::string>{"a.zarr"}));
   EXPECT_EQ(run(with({path("x.dat"), "--format", "ply"})).exit_code, 0);
 }
@@ -120,27 +119,72 @@ TEST_F(OutputName, DashIsStandardOutput) {
   const Outcome both = run({"export", store_, "-", "--json"});
   EXPECT_EQ(both.exit_code, 2);
   EXPECT_EQ(nlohmann::json::parse(both.out, nullptr, false)["error"]["exit_code"], 2);
-
-  const Arguments extract{"extract", store_, "--isovalue", "128", "-o"};
-  Arguments to_file = extract, to_stream = extract;
-  to_file.push_back(path("a.obj"));
-  to_stream.insert(to_stream.end(), {"-", "--format", "obj"});
-  ASSERT_EQ(run(to_file).exit_code, 0);
-  write_file(path("stream"), "");
-  ASSERT_EQ(run(to_stream, {.output = path("stream")}).exit_code, 0);
-  EXPECT_TRUE(read_file(path("stream")) == read_file(path("a.obj")));
   EXPECT_FALSE(fs::exists("-"));
+}
+
+TEST_F(OutputName, DashIsAMeshOnStandardOutput) {
+  const Arguments extract{"extract", store_, "--isovalue", "128", "-o"};
+  for (const std::string format : {"obj", "ply", "stl", "glb", "vtp"}) {
+    SCOPED_TRACE(format);
+    Arguments to_file = extract, to_stream = extract;
+    to_file.push_back(path("a." + format));
+    to_stream.insert(to_stream.end(), {"-", "--format", format});
+    ASSERT_EQ(run(to_file).exit_code, 0);
+    EXPECT_TRUE(streamed(to_stream) == read_file(path("a." + format)));
+  }
+  Arguments unnamed = extract;
+  unnamed.push_back("-");
+  EXPECT_TRUE(streamed(unnamed) == read_file(path("a.ply")));
+  EXPECT_EQ(files(),
+            (std::vector<std::string>{"a.glb", "a.obj", "a.ply", "a.stl", "a.vtp", "a.zarr"}));
+}
+
+TEST_F(OutputName, DashWaitsInTheFolderOfTemporaryFiles) {
+  const std::string program = path("run");
+  write_file(program, "TMPDIR='" + path("no") + "' exec " ISOBRICK_PROGRAM " \"$@\"");
+  write_file(path("stream"), "");
+  const Outcome outcome =
+      run_process({"sh", program, "extract", store_, "--isovalue", "128", "-o", "-"},
+                  {.output = path("stream")});
+  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_NE(outcome.err.find("TMPDIR"), std::string::npos) << outcome.err;
+  EXPECT_EQ(read_file(path("stream")), "");
+}
+
+TEST_F(OutputName, AReaderThatClosesThePipeIsAnError) {
+  const auto cut = [&](const std::string& command) {
+    write_file(path("run"), "{ " ISOBRICK_PROGRAM " " + command + "; echo $? > '" + path("code") +
+                                "'; } | head -c 10 > /dev/null");
+    const Outcome outcome = run_process({"sh", path("run")});
+    EXPECT_EQ(read_file(path("code")), "1\n") << command;
+    EXPECT_NE(outcome.err.find("Broken pipe"), std::string::npos) << outcome.err;
+  };
+  // More than a pipe holds.
+  const std::string mesh = "extract '" + store_ + "' --isovalue 128 -o - --format ";
+  for (const char* format : {"ply", "stl", "obj"}) cut(mesh + format);
+  const std::string big = path("big.zarr");
+  ASSERT_EQ(run({"synth", "gyroid", big, "--dims", "128,128,128", "--type", "u8"}).exit_code, 0);
+  cut("export '" + big + "' -");
 }
 
 TEST_F(OutputName, DashIsAPictureOnStandardOutput) {
   ASSERT_EQ(run({"extract", store_, "--isovalue", "128", "-o", path("m.ply")}).exit_code, 0);
-  const Arguments render{"render", path("m.ply"), "--size", "80x60", "-o"};
-  Arguments to_file = render, to_stream = render;
-  to_file.push_back(path("m.png"));
-  to_stream.push_back("-");
-  const Outcome made = run(to_file);
-  if (made.exit_code != 0) GTEST_SKIP() << made.err;
-  EXPECT_TRUE(streamed(to_stream) == read_file(path("m.png")));
+  const Arguments size{"--size", "80x60"};
+  for (const Arguments& command :
+       {Arguments{"render", path("m.ply"), "-o"},
+        Arguments{"extract", store_, "--isovalue", "128", "--preview"},
+        Arguments{"view", store_, "--isovalue", "128", "--screenshot"}}) {
+    SCOPED_TRACE(command.front());
+    Arguments to_file = command, to_stream = command;
+    to_file.push_back(path("m.png"));
+    to_stream.push_back("-");
+    for (Arguments* arguments : {&to_file, &to_stream})
+      arguments->insert(arguments->end(), size.begin(), size.end());
+    const Outcome made = run(to_file);
+    if (made.exit_code != 0) GTEST_SKIP() << made.err;
+    EXPECT_TRUE(streamed(to_stream) == read_file(path("m.png")));
+    fs::remove(path("m.png"));
+  }
 }
 
 TEST_F(OutputName, AFullStandardOutputIsAnError) {

@@ -206,9 +206,12 @@ TEST(Parse, StridesAndCounts) {
 TEST(OutputName, StemOfAnInput) {
   for (const auto& [path, stem] :
        {std::pair{"data/scan.nii.gz", "scan"}, std::pair{"series/", "series"},
-        std::pair{"a/scan.h5:/array", "scan"}, std::pair{"x.zarr///", "x"}, std::pair{"raw", "raw"},
-        std::pair{"a.b.nrrd", "a.b"}})
+        std::pair{"a/scan.h5:/array", "scan_array"}, std::pair{"scan.h5:/run/a", "scan_run_a"},
+        std::pair{"x.zarr///", "x"}, std::pair{"raw", "raw"}, std::pair{"a.b.nrrd", "a.b"}})
     EXPECT_EQ(stem_of_input(path), stem) << path;
+  EXPECT_EQ(stem_of_input("x.vdb", {.grid = "fog/a"}), "x_fog_a");
+  EXPECT_EQ(stem_of_input("x.zarr", {.selection = {.channel = 1, .time = {}}}), "x_c1");
+  EXPECT_EQ(stem_of_input("x.tif", {.selection = {.channel = 0, .time = 12}}), "x_c0_t12");
   EXPECT_THROW(stem_of_input("-"), UsageError);
 }
 

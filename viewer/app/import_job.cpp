@@ -1,23 +1,15 @@
 #include "viewer/app/import_job.h"
 
-#include <fcntl.h>
-#include <sys/file.h>
-#include <unistd.h>
-
-#include <algorithm>
+#include <exception>
 #include <utility>
 
 #include <fmt/format.h>
 
 #include <isobrick/error.h>
-#include "bricks/zarr/metadata_files.h"
 #include "core/file_error.h"
 #include "core/shell_word.h"
-#include "io/bytes/file.h"
 #include "io/meshes/mesh_name.h"
 #include "io/volumes/open/volume_format.h"
-#include "pipeline/convert/convert_staging.h"
-#include "pipeline/convert/store_source.h"
 #include "pipeline/index/add_ranges.h"
 
 namespace isobrick {
@@ -51,13 +43,14 @@ class ImportJob::Reporter final : public Progress {
   ImportJob& job_;
 };
 
-ImportJob::ImportJob(fs::path input, fs::path store, ConvertOptions options)
-    : input_(std::move(input)), store_(std::move(store)), options_(options) {
+ImportJob::ImportJob(fs::path input, OpenOptions options)
+    : input_(std::move(input)), options_(std::move(options)) {
+  options_.on_note = [this](const std::string& note) { add_note(note); };
   thread_ = std::thread([this] { run(); });
 }
 
-ImportJob::ImportJob(fs::path image, const Selection& volume, ConvertOptions options)
-    : input_(image), store_(std::move(image)), options_(options), volume_(volume) {
+ImportJob::ImportJob(fs::path image, const Selection& volume, OpenOptions options)
+    : input_(std::move(image)), options_(std::move(options)), volume_(volume) {
   thread_ = std::thread([this] { run(); });
 }
 
@@ -72,69 +65,52 @@ void ImportJob::add_note(std::string note) {
 }
 
 /// Opens the first volume of a file with several.
-std::unique_ptr<VolumeSource> ImportJob::open_first(VolumeRequest request) {
+void ImportJob::open_first(Progress& progress) {
   const std::string input = input_.string();
   std::exception_ptr why;
   for (const Selection& selection :
        {Selection{}, Selection{.channel = 0, .time = {}}, Selection{.channel = {}, .time = 0},
         Selection{.channel = 0, .time = 0}}) {
-    request.selection = selection;
+    options_.volume.selection = selection;
     try {
-      auto source = open_any_source(input, request);
+      auto opened = std::make_unique<OpenedVolume>(input, options_, progress);
       if (selection.channel || selection.time)
-        add_note(fmt::format(
-            "'{}' has several volumes; this is the first (others: isobrick convert{}{})",
-            input_.filename().string(), selection.channel ? " --channel" : "",
-            selection.time ? " --time" : ""));
-      return source;
+        add_note(
+            fmt::format("'{}' has several volumes; this is the first (others: isobrick view{}{})",
+                        input_.filename().string(), selection.channel ? " --channel" : "",
+                        selection.time ? " --time" : ""));
+      const MutexLock lock(mutex_);
+      opened_ = std::move(opened);
+      return;
     } catch (const UsageError&) {
+      if (begun_) throw;
       if (!why) why = std::current_exception();
     }
   }
   std::rethrow_exception(why);
 }
 
-std::unique_ptr<VolumeSource> ImportJob::open() {
-  VolumeRequest request;
-  request.threads = options_.threads;
+void ImportJob::open(Progress& progress) {
   const std::string input = input_.string();
-  if (is_zarr(input)) return open_first(request);
   if (has_mesh_name(input_)) {
     fs::path picture = input_;
     throw Error(fmt::format("'{}' is a mesh, no volume; draw it: isobrick render {} -o {}", input,
                             shell_word(input),
                             shell_word(picture.replace_extension(".png").string())));
   }
-  request.memory = options_.memory;
   // A folder of slices has no format.
   if (fs::is_regular_file(input_) && recognise_format(input) == VolumeFormat::vdb)
-    request.grid = grid_to_show(read_vdb_header(input));
-  if (request.grid)
-    add_note(fmt::format("'{}' has several grids; this is '{}' (others: isobrick convert --grid)",
-                         input_.filename().string(), *request.grid));
-  return open_first(request);
-}
-
-void ImportJob::convert_input(Progress& progress) {
-  const auto source = open();
-  convert(*source, store_, options_, progress);
-  for (std::string& note : source->notes()) add_note(std::move(note));
+    options_.volume.grid = grid_to_show(read_vdb_header(input));
+  if (options_.volume.grid)
+    add_note(fmt::format("'{}' has several grids; this is '{}' (others: isobrick view --grid)",
+                         input_.filename().string(), *options_.volume.grid));
+  open_first(progress);
 }
 
 void ImportJob::add_ranges(Progress& progress) {
-  add_missing_ranges(store_, *volume_, options_.memory, options_.threads, progress);
+  add_missing_ranges(input_, *volume_, options_.memory, options_.threads, progress);
   add_note(fmt::format("the ranges of the samples were computed; they are in '{}'",
-                       (store_ / "isobrick").string()));
-}
-
-/// Removes a cancelled conversion, which is not resumed after a drop. Another process may have
-/// taken it over, and locked it; then it stays.
-void ImportJob::discard() const {
-  const fs::path partial = staging_path(store_);
-  const UniqueFd folder(::open(partial.c_str(), O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC));
-  if (folder.get() < 0 || ::flock(folder.get(), LOCK_EX | LOCK_NB) != 0) return;
-  std::error_code ignored;
-  fs::remove_all(partial, ignored);
+                       (input_ / "isobrick").string()));
 }
 
 void ImportJob::run() {
@@ -145,13 +121,12 @@ void ImportJob::run() {
     if (volume_)
       add_ranges(reporter);
     else
-      convert_input(reporter);
+      open(reporter);
   } catch (const Cancelled&) {
     cancelled = true;
   } catch (const std::exception& e) {
     failure = error_message(e);
   }
-  if (begun_ && !volume_ && (cancelled || !failure.empty())) discard();
   const MutexLock lock(mutex_);
   state_.finished = true;
   state_.cancelled = cancelled;
@@ -161,6 +136,11 @@ void ImportJob::run() {
 ImportJob::State ImportJob::state() const {
   const MutexLock lock(mutex_);
   return state_;
+}
+
+std::unique_ptr<OpenedVolume> ImportJob::take() {
+  const MutexLock lock(mutex_);
+  return std::move(opened_);
 }
 
 std::optional<std::string> grid_to_show(const std::vector<VdbGrid>& grids) {
@@ -173,20 +153,6 @@ std::optional<std::string> grid_to_show(const std::vector<VdbGrid>& grids) {
       first = &grid;
   }
   return readable > 1 ? std::optional(first->name) : std::nullopt;
-}
-
-fs::path store_for(const fs::path& input) {
-  const fs::path full = fs::absolute(input);
-  const fs::path folder = access(full.parent_path().c_str(), W_OK) == 0 ? full.parent_path()
-                                                                        : fs::temp_directory_path();
-  const std::string stem = full.stem().string();
-  fs::path store = folder / (stem + ".zarr");
-  const auto taken = [](const fs::path& path) {
-    return fs::exists(path) || fs::exists(staging_path(path));
-  };
-  for (int number = 2; taken(store); ++number)
-    store = folder / fmt::format("{}-{}.zarr", stem, number);
-  return store;
 }
 
 }  // namespace isobrick

@@ -2,7 +2,6 @@
 
 #include <atomic>
 #include <cstdint>
-#include <exception>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -10,22 +9,23 @@
 #include <thread>
 #include <vector>
 
-#include <isobrick/convert.h>
+#include <isobrick/open_volume.h>
 #include <isobrick/selection.h>
-#include <isobrick/volume_request.h>
 #include "core/thread_annotations.h"
 #include "io/volumes/vdb/vdb_header.h"
 
 namespace isobrick {
 
-/// Makes a volume ready to view, on a thread of its own: converts it, or adds ranges to an image.
-/// The destructor cancels it and waits until no unfinished files are left.
+/// Makes a volume ready to view, on a thread of its own: opens it by way of the cache, or adds
+/// ranges to an image. The destructor cancels it and waits for the thread.
 class ImportJob {
  public:
-  /// Converts `input`, a store or any format of open_source(), to `store`.
-  ImportJob(std::filesystem::path input, std::filesystem::path store, ConvertOptions options);
-  /// Adds the ranges that a volume of an image lacks, in place.
-  ImportJob(std::filesystem::path image, const Selection& volume, ConvertOptions options);
+  /// Opens `input`, any format of open_source(), as OpenedVolume does; of several volumes or grids
+  /// the first. `options` needs neither a volume nor on_note.
+  ImportJob(std::filesystem::path input, OpenOptions options);
+  /// Adds the ranges that a volume of an image lacks, in place, with the options' memory and
+  /// threads.
+  ImportJob(std::filesystem::path image, const Selection& volume, OpenOptions options);
   ~ImportJob();
 
   struct State {
@@ -34,42 +34,38 @@ class ImportJob {
     bool finished = false;              ///< also after failure or cancellation
     std::string failure;                ///< empty after success or cancellation
     bool cancelled = false;
-    std::vector<std::string> notes;  ///< messages about the input, as `convert` prints them
+    std::vector<std::string> notes;  ///< messages about the input, as `view INPUT` prints them
   };
   State state() const;
+  /// What was opened, once; null before it has finished, after a failure, and of an image.
+  std::unique_ptr<OpenedVolume> take();
   void cancel() { cancel_ = true; }
 
   const std::filesystem::path& input() const { return input_; }
-  const std::filesystem::path& store() const { return store_; }
-  /// The volume whose ranges are added; nullopt for a conversion.
+  /// The volume of the image input() whose ranges are added; nullopt for a file that is opened.
   const std::optional<Selection>& volume() const { return volume_; }
 
  private:
   class Reporter;
   void run();
-  void convert_input(Progress& progress);
+  void open(Progress& progress);
+  void open_first(Progress& progress);
   void add_ranges(Progress& progress);
-  void discard() const;
-  std::unique_ptr<VolumeSource> open();
-  std::unique_ptr<VolumeSource> open_first(VolumeRequest request);
   void add_note(std::string note);
 
-  std::filesystem::path input_, store_;
-  ConvertOptions options_;
+  std::filesystem::path input_;
+  OpenOptions options_;  ///< for the thread only, as begun_
   std::optional<Selection> volume_;
   mutable Mutex mutex_;
   State state_ ISOBRICK_GUARDED_BY(mutex_);
+  std::unique_ptr<OpenedVolume> opened_ ISOBRICK_GUARDED_BY(mutex_);
   std::atomic<bool> cancel_ = false;
-  bool begun_ = false;  ///< the conversion has made its folder; for the thread only
+  bool begun_ = false;  ///< the conversion has begun
   std::thread thread_;  ///< last member: it uses the others
 };
 
 /// Chooses the grid of a dropped OpenVDB file with several: the first of floats, else the first
 /// that can be read.
 std::optional<std::string> grid_to_show(const std::vector<VdbGrid>& grids);
-
-/// The path of a dropped file's store, which does not exist yet: beside the file if its folder is
-/// writable, else among temporary files.
-std::filesystem::path store_for(const std::filesystem::path& input);
 
 }  // namespace isobrick

@@ -275,9 +275,8 @@ void status_panel(ViewerState& state) {
 
 void import_progress(ImportJob& import) {
   const ImportJob::State s = import.state();
-  text(import.volume()
-           ? fmt::format("{}\nranges of its samples", import.input().string())
-           : fmt::format("{}\nto {}", import.input().string(), import.store().string()));
+  text(fmt::format("{}{}", import.input().string(),
+                   import.volume() ? "\nranges of its samples" : ""));
   const float part = s.total > 0 ? static_cast<float>(s.done) / static_cast<float>(s.total) : 0;
   ImGui::ProgressBar(std::min(part, 1.f), {scaled(400), 0}, s.stage.c_str());
   if (ImGui::Button("Cancel")) import.cancel();
@@ -344,7 +343,7 @@ void main_panel(ViewerState& state) {
   ImGui::SetNextWindowPos({0, 0}, ImGuiCond_Always);
   ImGui::SetNextWindowSize({scaled(kPanelWidth), all.y}, ImGuiCond_FirstUseEver);
   ImGui::SetNextWindowSizeConstraints({least, all.y}, {std::max(least, all.x * 0.6f), all.y});
-  ImGui::Begin(fmt::format("{}###panel", state.path.filename().string()).c_str(), nullptr,
+  ImGui::Begin(fmt::format("{}###panel", state.name).c_str(), nullptr,
                ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoCollapse);
   state.panel_width = ImGui::GetWindowWidth();
   draw_volumes_panel(state);

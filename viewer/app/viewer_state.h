@@ -59,6 +59,7 @@ struct TypedIsovalue {
 /// The state of a window, which panels change. Not thread-safe.
 struct ViewerState {
   std::filesystem::path path;                     ///< of the store; empty: none is open
+  std::string name;                               ///< what people call it
   ImageVolumes volumes;                           ///< volumes of the store, and the chosen one
   std::unique_ptr<SceneRenderer> scene_renderer;  ///< of the store; null: none is open
   std::unique_ptr<IsovalueStats> isovalue_stats;  ///< of the store

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include <isobrick/open_volume.h>
 #include "viewer/app/viewer_state.h"
 #include "viewer/render/camera_request.h"
 
@@ -19,6 +20,7 @@ struct WindowOptions {
   int width = 1280, height = 800;
   PictureBudgets budgets;
   IndexKind index = IndexKind::linear;  ///< index over active nodes
+  CacheOptions cache;                   ///< for stores of files that are dropped
   CameraRequest camera;                 ///< for the first store
   ViewSettings settings;                ///< for the first store
   std::filesystem::path bookmarks;      ///< file; empty: Bookmarks::default_file()
@@ -35,14 +37,16 @@ class ViewerWindow {
   ViewerWindow(const ViewerWindow&) = delete;
   ViewerWindow& operator=(const ViewerWindow&) = delete;
 
-  /// Opens a store, or a volume of an image with channels or times; by default the first. Throws
-  /// what opening throws; the present store stays then.
-  void open(const std::filesystem::path& store, const Selection& selection = {});
+  /// Opens a store, or a volume of an image with channels or times; by default the first. `name` is
+  /// what people call it, the store's own if empty. Throws what opening throws; the present store
+  /// stays then.
+  void open(const std::filesystem::path& store, const Selection& selection = {},
+            const std::string& name = {});
   /// Opens another volume of the same image. Camera and settings stay, but isovalues outside its
   /// range are replaced. Failures become messages.
   void show_volume(const Selection& selection);
-  /// Opens a store, or converts a file of another format and opens the result. Computes the ranges
-  /// of an image without any first. Failures become messages.
+  /// Opens a store, or a file of another format by way of the cache. Computes the ranges of an
+  /// image without any first. Failures become messages.
   void drop(const std::filesystem::path& path);
 
   /// Waits for events and shows the next frame if it may differ. The wait is at most `max_seconds`,
@@ -82,9 +86,11 @@ class ViewerWindow {
   void begin_frame();
   void end_frame();
   void show_notice(const std::string& text);
-  void load(const std::filesystem::path& path, const Selection& selection);
+  void load(const std::filesystem::path& path, const Selection& selection, const std::string& name);
+  void show(std::unique_ptr<OpenedVolume> opened, const std::filesystem::path& input,
+            const Selection& selection = {});
   bool begin_ranges(const std::filesystem::path& path, const Selection& selection);
-  ConvertOptions import_options() const;
+  OpenOptions import_options() const;
   void frame_camera(FrameTarget framed);
   void report_empty_surfaces();
   WindowKey window_key() const;
@@ -112,6 +118,7 @@ class ViewerWindow {
   GLFWwindow* window_ = nullptr;
   std::shared_ptr<PictureSetup> setup_;
   std::unique_ptr<Events> events_;
+  std::unique_ptr<OpenedVolume> opened_;  ///< keeps the store of a dropped file; may be null
   ViewerState state_;
   double last_time_ = 0;
   double open_time_ = 0;        ///< when the store was opened

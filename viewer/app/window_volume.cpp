@@ -20,7 +20,8 @@
 namespace isobrick {
 
 /// Replaces the volume; the settings stay.
-void ViewerWindow::load(const std::filesystem::path& path, const Selection& selection) {
+void ViewerWindow::load(const std::filesystem::path& path, const Selection& selection,
+                        const std::string& name) {
   ImageVolumes volumes = image_volumes(path, selection);
   auto store = std::make_shared<const StoreReader>(path, volumes.selection);
   auto stats = std::make_unique<IsovalueStats>(store);
@@ -31,6 +32,7 @@ void ViewerWindow::load(const std::filesystem::path& path, const Selection& sele
   state_.isovalue_stats = std::move(stats);
   state_.scene_renderer = std::move(renderer);
   state_.path = path;
+  state_.name = name;
   state_.volumes = std::move(volumes);
   state_.pacer = FramePacer::for_device(current_gl_device().software);
   open_time_ = glfwGetTime();
@@ -42,16 +44,16 @@ void ViewerWindow::load(const std::filesystem::path& path, const Selection& sele
   reported_damage_.clear();
   reported_empty_.clear();
   const std::string volume = text_of(state_.volumes);
-  glfwSetWindowTitle(window_, fmt::format("{}{}{} - Isobrick", path.filename().string(),
-                                          volume.empty() ? "" : ", ", volume)
-                                  .c_str());
+  glfwSetWindowTitle(
+      window_, fmt::format("{}{}{} - Isobrick", name, volume.empty() ? "" : ", ", volume).c_str());
   has_event_ = true;
 }
 
-void ViewerWindow::open(const std::filesystem::path& path, const Selection& selection) {
-  if (state_.scene_renderer == nullptr)
-    show_notice(fmt::format("Opening '{}' …", path.filename().string()));
-  load(path, selection);
+void ViewerWindow::open(const std::filesystem::path& path, const Selection& selection,
+                        const std::string& name) {
+  const std::string shown = name.empty() ? path.filename().string() : name;
+  if (state_.scene_renderer == nullptr) show_notice(fmt::format("Opening '{}' …", shown));
+  load(path, selection, shown);
   state_.selected = 0;
   state_.settings = options_.settings;
   // In software four samples per pixel take more time than anything else.
@@ -78,7 +80,7 @@ void ViewerWindow::open(const std::filesystem::path& path, const Selection& sele
 void ViewerWindow::show_volume(const Selection& selection) {
   try {
     if (begin_ranges(state_.path, selection)) return;
-    load(state_.path, selection);
+    load(state_.path, selection, state_.name);
     ViewSettings& settings = state_.settings;
     const ValueRange<double> range = state_.isovalue_stats->counts().range();
     for (SurfaceSettings& surface : settings.surfaces)
@@ -92,9 +94,10 @@ void ViewerWindow::show_volume(const Selection& selection) {
   }
 }
 
-ConvertOptions ViewerWindow::import_options() const {
+OpenOptions ViewerWindow::import_options() const {
   if (state_.import != nullptr) throw Error("another file is being converted");
-  ConvertOptions options;
+  OpenOptions options;
+  options.cache = options_.cache;
   options.memory = options_.budgets.memory;
   options.threads = options_.budgets.threads;
   return options;
@@ -108,12 +111,22 @@ bool ViewerWindow::begin_ranges(const std::filesystem::path& path, const Selecti
   return true;
 }
 
+/// Opens a file that was dropped; `opened` is its store, null of what is a store itself.
+void ViewerWindow::show(std::unique_ptr<OpenedVolume> opened, const std::filesystem::path& input,
+                        const Selection& selection) {
+  if (opened != nullptr)
+    open(opened->store().info().path, opened->store().info().selection, input.filename().string());
+  else
+    open(input, selection);
+  opened_ = std::move(opened);
+}
+
 void ViewerWindow::drop(const std::filesystem::path& path) {
   try {
     if (!is_zarr(path))
-      state_.import = std::make_unique<ImportJob>(path, store_for(path), import_options());
+      state_.import = std::make_unique<ImportJob>(path, import_options());
     else if (!begin_ranges(path, {}))
-      open(path);
+      show({}, path);
   } catch (const std::exception& e) {
     state_.show_message(error_message(e));
   }
@@ -123,16 +136,17 @@ void ViewerWindow::handle_import() {
   if (state_.import == nullptr) return;
   const ImportJob::State now = state_.import->state();
   if (!now.finished) return;
-  const std::filesystem::path store = state_.import->store();
+  const std::filesystem::path input = state_.import->input();
   const std::optional<Selection> volume = state_.import->volume();
+  std::unique_ptr<OpenedVolume> opened = state_.import->take();
   state_.import.reset();
   if (now.cancelled) return;
   if (!now.failure.empty()) return state_.show_message(now.failure);
   try {
-    if (volume && store == state_.path)
+    if (volume && input == state_.path)
       show_volume(*volume);
     else
-      open(store, volume.value_or(Selection()));
+      show(std::move(opened), input, volume.value_or(Selection()));
   } catch (const std::exception& e) {
     state_.show_message(error_message(e));
   }

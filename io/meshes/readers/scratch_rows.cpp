@@ -2,22 +2,9 @@
 
 #include <fmt/format.h>
 
-#include <filesystem>
-
-#include <isobrick/error.h>
+#include "io/bytes/leftovers.h"
 
 namespace isobrick {
-namespace {
-
-std::filesystem::path temporary_folder() {
-  std::error_code failure;
-  std::filesystem::path folder = std::filesystem::temp_directory_path(failure);
-  if (failure)
-    throw Error("there is no folder for temporary files; set TMPDIR to one: " + failure.message());
-  return folder;
-}
-
-}  // namespace
 
 ScratchBytes::ScratchBytes()
     : out_(open_scratch_beside((temporary_folder() / "isobrick").string())) {}

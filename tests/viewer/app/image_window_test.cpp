@@ -151,7 +151,7 @@ TEST_F(ImageWindow, ATimeOfAFileThatIsDroppedIsItsFirst) {
                  ball(8, 1) + ball(12, 1));
   window.drop(dir_ / "movie.nrrd");
   until([&] { return window.state().import == nullptr; });
-  EXPECT_EQ(window.state().path, dir_ / "movie.zarr")
+  EXPECT_EQ(window.state().name, "movie.nrrd")
       << (window.state().messages.empty() ? "" : window.state().messages[0].text);
   EXPECT_TRUE(has_message("'movie.nrrd' has several volumes; this is the first"));
   window.state().settings.surfaces[0].isovalue = 128;
@@ -164,7 +164,7 @@ TEST_F(ImageWindow, RemarksOfAReaderAreShown) {
              "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 40 40 40\nencoding: raw\n\n" +
                  ball(8, 1) + "more than that");
   window.drop(dir_ / "long.nrrd");
-  until([&] { return window.state().path == dir_ / "long.zarr"; });
+  until([&] { return window.state().name == "long.nrrd"; });
   steps(2);
   EXPECT_TRUE(has_message("14 bytes"));
 }

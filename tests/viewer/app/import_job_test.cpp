@@ -1,16 +1,12 @@
 #include "viewer/app/import_job.h"
 
-#include <fcntl.h>
 #include <gtest/gtest.h>
-#include <sys/file.h>
 
 #include <chrono>
 #include <filesystem>
 #include <thread>
 
 #include <isobrick/open_source.h>
-#include <isobrick/store_reader.h>
-#include "io/bytes/file.h"
 #include "tests/io/bytes/temp_dir.h"
 
 namespace isobrick {
@@ -28,29 +24,58 @@ std::string ramp(std::size_t n) {
   return samples;
 }
 
-TEST(ImportJob, ConvertsWhatItIsGiven) {
+/// With a cache in `dir`.
+OpenOptions cached(const TempDir& dir) {
+  OpenOptions options;
+  options.cache.folder = dir / "cache";
+  return options;
+}
+
+Int3 extent_of(const OpenedVolume* volume) {
+  return volume == nullptr ? Int3{} : volume->store().info().levels[0].lattice.extent;
+}
+
+TEST(ImportJob, OpensWhatItIsGivenThroughTheCache) {
   const TempDir dir;
   dir.write("ramp_40x30x20_uint8.raw", ramp(40 * 30 * 20));
-  const ImportJob job(dir / "ramp_40x30x20_uint8.raw", dir / "ramp.zarr", {});
-  const ImportJob::State state = finished(job);
-  EXPECT_TRUE(state.finished);
-  EXPECT_EQ(state.failure, "");
-  EXPECT_EQ(StoreReader(dir / "ramp.zarr").info().levels[0].lattice.extent, (Int3{40, 30, 20}));
+  for (const bool first : {true, false}) {
+    ImportJob job(dir / "ramp_40x30x20_uint8.raw", cached(dir));
+    const ImportJob::State state = finished(job);
+    EXPECT_TRUE(state.finished);
+    EXPECT_EQ(state.failure, "");
+    const auto opened = job.take();
+    EXPECT_EQ(extent_of(opened.get()), (Int3{40, 30, 20}));
+    EXPECT_EQ(opened->converted(), first);
+    EXPECT_EQ(state.notes.size(), first ? 1u : 0u);
+    EXPECT_EQ(job.take(), nullptr);
+  }
+}
+
+TEST(ImportJob, WithoutACacheTheStoreGoesWithTheVolume) {
+  const TempDir dir;
+  dir.write("ramp_40x30x20_uint8.raw", ramp(40 * 30 * 20));
+  ImportJob job(dir / "ramp_40x30x20_uint8.raw", OpenOptions{});
+  EXPECT_EQ(finished(job).failure, "");
+  auto opened = job.take();
+  const std::filesystem::path store = opened->store().info().path;
+  EXPECT_TRUE(std::filesystem::exists(store));
+  opened.reset();
+  EXPECT_FALSE(std::filesystem::exists(store));
 }
 
 TEST(ImportJob, HasTheRemarksOfTheReader) {
   const TempDir dir;
   dir.write("ramp.nrrd", "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 40 30 20\nencoding: raw\n\n" +
                              ramp(40 * 30 * 20 + 9));
-  const ImportJob job(dir / "ramp.nrrd", dir / "ramp.zarr", {});
+  const ImportJob job(dir / "ramp.nrrd", cached(dir));
   const ImportJob::State state = finished(job);
   EXPECT_EQ(state.failure, "");
-  ASSERT_EQ(state.notes.size(), 1u);
-  EXPECT_EQ(state.notes, open_source(dir / "ramp.nrrd", VolumeRequest{})->notes());
-  EXPECT_TRUE(contains(state.notes[0], "9 bytes")) << state.notes[0];
+  ASSERT_EQ(state.notes.size(), 2u);
+  EXPECT_EQ(state.notes[1], open_source(dir / "ramp.nrrd", VolumeRequest{})->notes().at(0));
+  EXPECT_TRUE(contains(state.notes[1], "9 bytes")) << state.notes[1];
 }
 
-/// The first of several volumes is converted, channels or times.
+/// The first of several volumes is opened, channels or times.
 TEST(ImportJob, TakesTheFirstOfSeveralVolumes) {
   const TempDir dir;
   const std::string head = "NRRD0004\ntype: uint8\ndimension: 4\nencoding: raw\n";
@@ -59,63 +84,47 @@ TEST(ImportJob, TakesTheFirstOfSeveralVolumes) {
   dir.write("channel.nrrd",
             head + "sizes: 2 40 30 20\nkinds: vector space space space\n\n" + samples);
   for (const std::string name : {"time", "channel"}) {
-    const ImportJob job(dir / (name + ".nrrd"), dir / (name + ".zarr"), {});
+    ImportJob job(dir / (name + ".nrrd"), cached(dir));
     const ImportJob::State state = finished(job);
     EXPECT_EQ(state.failure, "");
-    ASSERT_EQ(state.notes.size(), 1u);
-    EXPECT_TRUE(contains(state.notes[0], "isobrick convert --" + name + ")")) << state.notes[0];
-    EXPECT_EQ(StoreReader(dir / (name + ".zarr")).info().levels[0].lattice.extent,
-              (Int3{40, 30, 20}));
+    ASSERT_EQ(state.notes.size(), 2u);
+    EXPECT_TRUE(contains(state.notes[1], "isobrick view --" + name + ")")) << state.notes[1];
+    EXPECT_EQ(extent_of(job.take().get()), (Int3{40, 30, 20}));
   }
 }
 
 TEST(ImportJob, SaysWhatIsWrong) {
   const TempDir dir;
   dir.write("ramp_40x30x20_uint8.raw", ramp(100));
-  const ImportJob job(dir / "ramp_40x30x20_uint8.raw", dir / "ramp.zarr", {});
+  const ImportJob job(dir / "ramp_40x30x20_uint8.raw", cached(dir));
   EXPECT_NE(finished(job).failure.find("ramp_40x30x20_uint8.raw"), std::string::npos);
-  EXPECT_FALSE(std::filesystem::exists(dir / "ramp.zarr"));
 }
 
-TEST(ImportJob, LeavesNothingWhenItIsCancelled) {
+TEST(ImportJob, GoesOnWithWhatACancelledOneHasDone) {
   const TempDir dir;
-  dir.write("ramp_512x512x256_uint8.raw", ramp(512 * 512 * 256));
+  const std::string file = "ramp_512x512x256_uint8.raw";
+  dir.write(file, ramp(512 * 512 * 256));
   {
-    ImportJob job(dir / "ramp_512x512x256_uint8.raw", dir / "ramp.zarr", {});
+    ImportJob job(dir / file, cached(dir));
     while (job.state().done == 0 && !job.state().finished) std::this_thread::yield();
   }
-  EXPECT_EQ(dir.list().size(), 1u);
-}
-
-/// Another process may begin to write the same store after its name was chosen.
-TEST(ImportJob, LeavesWhatAnotherConversionHas) {
-  const TempDir dir;
-  dir.write("ramp_40x30x20_uint8.raw", ramp(40 * 30 * 20));
-  const std::string partial = dir / "ramp.zarr.partial";
-  std::filesystem::create_directory(partial);
-  dir.write("ramp.zarr.partial/.isobrick-layout.json", "{}");
-  for (const bool held : {true, false}) {
-    const UniqueFd folder(::open(partial.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
-    ASSERT_EQ(::flock(folder.get(), held ? LOCK_EX | LOCK_NB : LOCK_UN), 0);
-    const ImportJob job(dir / "ramp_40x30x20_uint8.raw", dir / "ramp.zarr", {});
-    const std::string failure = finished(job).failure;
-    EXPECT_EQ(contains(failure, "another conversion is writing"), held) << failure;
-    EXPECT_FALSE(failure.empty());
-    EXPECT_TRUE(std::filesystem::exists(partial + "/.isobrick-layout.json"));
-  }
+  EXPECT_EQ(dir.list(), (std::vector<std::string>{"cache", file}));
+  ImportJob job(dir / file, cached(dir));
+  EXPECT_EQ(finished(job).failure, "");
+  EXPECT_EQ(extent_of(job.take().get()), (Int3{512, 512, 256}));
 }
 
 TEST(ImportJob, SaysHowRawFilesAreNamed) {
   const TempDir dir;
   dir.write("ramp.raw", ramp(1000));
-  const ImportJob job(dir / "ramp.raw", dir / "ramp.zarr", {});
+  const ImportJob job(dir / "ramp.raw", cached(dir));
   EXPECT_TRUE(contains(finished(job).failure, "256x256x128_uint8.raw"));
 }
 
 TEST(ImportJob, NamesAMeshAsOne) {
   const TempDir dir;
   dir.write("head.STL", ramp(1000));
-  const ImportJob job(dir / "head.STL", dir / "head.zarr", {});
+  const ImportJob job(dir / "head.STL", cached(dir));
   const std::string failure = finished(job).failure;
   EXPECT_TRUE(contains(failure, "head.STL' is a mesh")) << failure;
   EXPECT_TRUE(contains(failure, "isobrick render ")) << failure;
@@ -126,7 +135,7 @@ TEST(ImportJob, NamesAMeshAsOne) {
 TEST(ImportJob, TakesFolders) {
   const TempDir dir;
   std::filesystem::create_directory(dir / "slices");
-  const ImportJob job(dir / "slices", dir / "slices.zarr", {});
+  const ImportJob job(dir / "slices", cached(dir));
   EXPECT_EQ(finished(job).failure,
             message_of<Error>([&] { open_source(dir / "slices", VolumeRequest{}); }));
 }
@@ -144,15 +153,6 @@ TEST(ImportJob, TakesTheFirstGridOfFloats) {
       shallow{.name = "shallow", .type = "Tree_float_4_3"};
   EXPECT_EQ(grid_to_show({shallow, labels, density}), "density[0]");
   EXPECT_EQ(grid_to_show({labels, others}), "labels");
-}
-
-TEST(StoreFor, TakesANameThatIsFree) {
-  const TempDir dir;
-  EXPECT_EQ(store_for(dir / "a.nrrd"), dir / "a.zarr");
-  dir.write("a.zarr", "");
-  EXPECT_EQ(store_for(dir / "a.nrrd"), dir / "a-2.zarr");
-  std::filesystem::create_directory(dir / "a-2.zarr.partial");
-  EXPECT_EQ(store_for(dir / "a.nrrd"), dir / "a-3.zarr");
 }
 
 }  // namespace

@@ -405,8 +405,15 @@ TEST_F(Window, OpensWhatIsDroppedOnIt) {
   for (std::size_t i = 0; i < samples.size(); ++i) samples[i] = static_cast<char>(i / 4096);
   dir_.write("ramp_64x64x64_uint8.raw", samples);
   window.drop(dir_ / "ramp_64x64x64_uint8.raw");
-  until([&] { return window.state().path == dir_ / "ramp_64x64x64_uint8.zarr"; });
-  EXPECT_TRUE(window.state().messages.empty());
+  until([&] { return window.state().name == "ramp_64x64x64_uint8.raw"; });
+  ASSERT_EQ(window.state().messages.size(), 1u);
+  EXPECT_NE(window.state().messages[0].text.find("into the cache ('" + (dir_ / "cache")),
+            std::string::npos);
+  window.drop(dir_ / "other.zarr");
+  EXPECT_EQ(window.state().path, dir_ / "other.zarr");
+  window.drop(dir_ / "ramp_64x64x64_uint8.raw");
+  until([&] { return window.state().name == "ramp_64x64x64_uint8.raw"; });
+  EXPECT_EQ(window.state().messages.size(), 1u) << "the store was kept";
 }
 
 TEST_F(Window, ShowsWhatIsWrongAndGoesOn) {

@@ -40,6 +40,7 @@ class WindowTest : public testing::Test {
     options.width = kWindowWidth;
     options.height = kWindowHeight;
     options.bookmarks = dir_ / "bookmarks.json";
+    options.cache.folder = dir_ / "cache";
     options.settings.occlusion = options.settings.multisample = false;  // slow in software
     window_ = std::make_unique<ViewerWindow>(options);
     window_->open(dir_ / "sphere.zarr");
