@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -33,6 +34,8 @@ struct OpenOptions {
   bool needs_ranges = true;
   std::uint64_t memory = std::uint64_t{1} << 30;  ///< budget of the conversion, bytes
   int threads = 0;                                ///< 0: all cores
+  /// Ends the operation with Cancelled, soon after a stop is requested on any thread.
+  std::stop_token cancel = {};
 };
 
 /// A volume that can be read as a store, whatever its format.
