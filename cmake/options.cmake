@@ -48,6 +48,16 @@ function(isobrick_alone)
   set_source_files_properties(${ARGN} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
 endfunction()
 
+# isobrick_interface(name LINK …): isobrick::name stands for several libraries.
+function(isobrick_interface name)
+  cmake_parse_arguments(arg "" "" "LINK" ${ARGN})
+  add_library(isobrick_${name} INTERFACE)
+  add_library(isobrick::${name} ALIAS isobrick_${name})
+  set_target_properties(isobrick_${name} PROPERTIES EXPORT_NAME ${name})
+  target_link_libraries(isobrick_${name} INTERFACE ${arg_LINK})
+  set_property(GLOBAL APPEND PROPERTY isobrick_libraries isobrick_${name})
+endfunction()
+
 # isobrick_library(name SOURCES … LINK … PRIVATE …): one folder, one target
 # isobrick::name. LINK is public: it is the folder's row in the dependency table.
 function(isobrick_library name)

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <optional>
+#include <stop_token>
 #include <vector>
 
 #include <isobrick/downsampling.h>
@@ -17,24 +18,26 @@ namespace isobrick {
 struct ConvertOptions {
   /// Samples along each edge of a brick, 16 … 256. Nothing: as many samples as a cube of 64 has, in
   /// bricks that follow the shape of a thin volume. No brick is much longer than the volume.
-  std::optional<Index> brick;
+  std::optional<Index> brick = {};
   /// Samples along each edge of a shard, a multiple of `brick`. Nothing: the same with a cube of
   /// 512.
-  std::optional<Index> shard;
+  std::optional<Index> shard = {};
   std::optional<int> zstd_level = 3;  ///< nothing: bricks are stored as they are
-  std::optional<int> levels;          ///< nothing: until one brick holds the coarsest
+  std::optional<int> levels = {};     ///< nothing: until one brick holds the coarsest
   /// From a level to the next, 1 or 2 an axis: of each step in turn, the last one of all further
   /// steps. Nothing: factors_by_spacing().
-  std::vector<Int3> factors;
+  std::vector<Int3> factors = {};
   OmeVersion ome = OmeVersion::v05;                ///< 0.4 has no shards: `shard` does not matter
   Downsampling downsampling = Downsampling::mean;  ///< how a level is made from the finer one
   std::uint64_t memory = std::uint64_t{1} << 30;   ///< hard budget, bytes
   int threads = 0;                                 ///< 0: all cores
   bool resume = false;  ///< go on with an interrupted conversion of the same input
   bool force = false;   ///< replace a store that exists (only when the new one is whole)
-  std::vector<std::filesystem::path> inputs;  ///< never replaced, beside the source's files
-  std::optional<IndexKind> index;             ///< also add one of this kind to all levels
-  Index leaf = kDefaultLeaf;                  ///< of that index
+  std::vector<std::filesystem::path> inputs = {};  ///< never replaced, beside the source's files
+  std::optional<IndexKind> index = {};             ///< also add one of this kind to all levels
+  Index leaf = kDefaultLeaf;                       ///< of that index
+  /// Ends the operation with Cancelled, soon after a stop is requested on any thread.
+  std::stop_token cancel = {};
 };
 
 /// What a conversion did.
@@ -55,6 +58,6 @@ struct ConvertReport {
 /// is too small for one row of bricks (naming the least that does), and where
 /// ConvertStaging does.
 ConvertReport convert(VolumeSource& source, const std::filesystem::path& out,
-                      const ConvertOptions& options, Progress& progress);
+                      const ConvertOptions& options, Progress& progress = no_progress());
 
 }  // namespace isobrick

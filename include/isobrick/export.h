@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <optional>
+#include <stop_token>
 
 #include <isobrick/inside.h>
 #include <isobrick/progress.h>
@@ -20,14 +21,16 @@ inline constexpr int kWidestHalfBand = 100;
 struct ExportOptions {
   ExportFormat format = ExportFormat::raw;  ///< of the file
   /// Of OpenVDB: a level set of this isosurface in place of the samples.
-  std::optional<double> isovalue;
-  std::optional<Inside> inside;  ///< of that; as ExtractOptions::inside
-  int half_band = 3;        ///< voxels with distances on either side of that, 1 … kWidestHalfBand
-  int level = 0;            ///< 0: the finest
-  std::optional<Box3> roi;  ///< samples of that level; nothing: all
-  bool force = false;       ///< replace a file that exists, once the new one is whole
+  std::optional<double> isovalue = {};
+  std::optional<Inside> inside = {};  ///< of that; as ExtractOptions::inside
+  int half_band = 3;  ///< voxels with distances on either side of that, 1 … kWidestHalfBand
+  int level = 0;      ///< 0: the finest
+  std::optional<Box3> roi = {};  ///< samples of that level; nothing: all
+  bool force = false;            ///< replace a file that exists, once the new one is whole
   std::uint64_t memory = std::uint64_t{1} << 30;  ///< hard budget, bytes
   int threads = 0;                                ///< 0: all cores
+  /// Ends the operation with Cancelled, soon after a stop is requested on any thread.
+  std::stop_token cancel = {};
 };
 
 /// Writes the samples of one level (or of a region) bit for bit, C order [z, y, x],
@@ -40,6 +43,6 @@ struct ExportOptions {
 /// the fill value, or a UsageError once they exceed the budget. Nothing appears under
 /// the final name until it is whole.
 void export_volume(const StoreReader& store, const std::filesystem::path& out,
-                   const ExportOptions& options, Progress& progress);
+                   const ExportOptions& options, Progress& progress = no_progress());
 
 }  // namespace isobrick

@@ -43,7 +43,7 @@ std::string why_no_histogram(const StoreReader& store, std::uint64_t memory);
 /// level with at most 2²⁴ samples (or else of the coarsest), read brick by brick. Throws
 /// DamageError for a damaged one, and Error for a brick that cannot be read, unless those are to be
 /// left out and others are left.
-Histogram histogram(const StoreReader& store, Progress& progress, int max_bins = 64,
+Histogram histogram(const StoreReader& store, Progress& progress = no_progress(), int max_bins = 64,
                     bool leaves_out = false);
 
 /// The same samples in at most so many bins of equal width, the first of which begins at lo: for

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <stop_token>
 #include <vector>
 
 #include <isobrick/index_kind.h>
@@ -18,12 +19,14 @@ inline constexpr Index kDefaultLeaf = 16;
 /// An index to add to a store.
 struct IndexOptions {
   IndexKind kind = IndexKind::octree;             ///< its data structure
-  Selection selection;                            ///< of an image with several channels or times
+  Selection selection = {};                       ///< of an image with several channels or times
   Index leaf = kDefaultLeaf;                      ///< 1, 2, 4, 8 or 16 cells
   std::uint64_t memory = std::uint64_t{1} << 30;  ///< hard budget, bytes
   int threads = 0;                                ///< 0: all cores
   bool resume = false;  ///< go on with an interrupted build of the same index
   bool force = false;   ///< replace an index of this kind, only when the new one is whole
+  /// Ends the operation with Cancelled, soon after a stop is requested on any thread.
+  std::stop_token cancel = {};
 };
 
 /// What adding an index did.
@@ -53,6 +56,6 @@ void check_index_options(const IndexOptions& options, const Lattice& lattice,
 /// one and neither `resume` nor `force` is set, or when the budget is too
 /// small (naming the least that does), Error when another process is at it.
 IndexReport add_index(const std::filesystem::path& store, const IndexOptions& options,
-                      Progress& progress);
+                      Progress& progress = no_progress());
 
 }  // namespace isobrick

@@ -19,6 +19,7 @@
 #include <isobrick/store_reader.h>
 #include <isobrick/synth_source.h>
 #include <isobrick/verify.h>
+#include <isobrick/version.h>
 #include <isobrick/volume.h>
 #include <isobrick/volume_extractor.h>
 #include <isobrick/volume_source.h>

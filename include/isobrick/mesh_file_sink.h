@@ -29,10 +29,10 @@ bool has_vertices(MeshFormat format);
 
 /// How a mesh file is written.
 struct MeshFileOptions {
-  std::optional<MeshFormat> format;  ///< nullopt: by the name's extension
-  bool quantize = false;             ///< GLB: 16 bits a number (KHR_mesh_quantization)
-  bool force = false;                ///< replaces a file that exists
-  int threads = 0;                   ///< that may help to write; 0: all cores
+  std::optional<MeshFormat> format = {};  ///< nullopt: by the name's extension
+  bool quantize = false;                  ///< GLB: 16 bits a number (KHR_mesh_quantization)
+  bool force = false;                     ///< replaces a file that exists
+  int threads = 0;                        ///< that may help to write; 0: all cores
   /// Bytes of the whole operation's budget, of which the sink takes a small part
   /// (MeshSink::memory).
   std::uint64_t memory = std::uint64_t{1} << 30;

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -36,7 +37,9 @@ struct OpenOptions {
   int threads = 0;                                ///< 0: all cores
   /// Called with each of OpenedVolume::notes() when it comes up, which is before a conversion
   /// begins; from the thread that opens. May be empty.
-  std::function<void(const std::string&)> on_note;
+  std::function<void(const std::string&)> on_note = {};
+  /// Ends the operation with Cancelled, soon after a stop is requested on any thread.
+  std::stop_token cancel = {};
 };
 
 /// A volume that can be read as a store, whatever its format.

@@ -9,8 +9,8 @@ namespace isobrick {
 
 /// Which of several volumes in one file is meant, counted from 0.
 struct Selection {
-  std::optional<Index> channel;  ///< nothing: the only one
-  std::optional<Index> time;     ///< nothing: the only one
+  std::optional<Index> channel = {};  ///< nothing: the only one
+  std::optional<Index> time = {};     ///< nothing: the only one
 };
 
 /// The place on an axis of `count` channels or times that is chosen. `option` is

@@ -17,9 +17,9 @@ struct SurfaceOptions {
   /// vertices around such a sample become one, the mesh stays welded and closed.
   bool drop_degenerate = false;
   /// Samples between which cells are looked at.
-  Box3 roi;
-  Transform transform;    ///< index space to world space
-  double fill_value = 0;  ///< of absent bricks
+  Box3 roi = {};
+  Transform transform = {};  ///< index space to world space
+  double fill_value = 0;     ///< of absent bricks
   /// Whether samples may be NaN: costs a look at every sample's neighbours.
   bool may_have_nan = false;
 };

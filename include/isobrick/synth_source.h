@@ -31,7 +31,7 @@ struct SynthOptions {
   /// gyroid: periods along the longest edge; of N cells along that edge about
   /// 4.6 · frequency / N are active (2 at 512³: 1.8 %).
   /// mixing: largest eddies along the longest edge. Nothing: 2 and 6.
-  std::optional<double> frequency;
+  std::optional<double> frequency = {};
   /// gyroid: amplitude of the noise, as a part of the field's.
   double noise = 0.01;
 };

@@ -22,14 +22,14 @@ inline constexpr ByteOrder kNativeOrder =
 
 /// A box of which every bound may be left out; half-open.
 struct RegionRequest {
-  std::array<std::optional<Index>, 3> lo;  ///< the first sample along x, y, z
-  std::array<std::optional<Index>, 3> hi;  ///< behind the last sample along x, y, z
+  std::array<std::optional<Index>, 3> lo = {};  ///< the first sample along x, y, z
+  std::array<std::optional<Index>, 3> hi = {};  ///< behind the last sample along x, y, z
 };
 
 /// A box of world space that is not empty.
 struct WorldRegion {
-  Vec3d lo;  ///< the lower corner
-  Vec3d hi;  ///< the upper corner
+  Vec3d lo = {};  ///< the lower corner
+  Vec3d hi = {};  ///< the upper corner
 };
 
 /// The samples of a volume of so many that are requested. Throws UsageError for a region that is
@@ -48,25 +48,25 @@ Box3 covering_samples(const WorldRegion& region, const Transform& transform, Int
 /// they override a header beside the file and the file's name. The others
 /// are for all formats and override the file.
 struct VolumeRequest {
-  std::optional<Int3> extent;           ///< samples along x, y, z
-  std::optional<ScalarType> type;       ///< of the samples
-  std::optional<ByteOrder> order;       ///< of the samples
-  std::optional<std::uint64_t> offset;  ///< bytes before the first sample
-  std::optional<Vec3d> spacing;         ///< as Transform::spacing
-  std::optional<Vec3d> origin;          ///< as Transform::origin
-  std::optional<std::string> unit;      ///< as Transform::unit
-  Selection selection;                  ///< of a file with several volumes
-  std::optional<std::string> grid;      ///< of an OpenVDB file
-  std::optional<RegionRequest> bounds;  ///< of a sparse grid, in its own index coordinates
-  Int3 stride{1, 1, 1};                 ///< the first of so many samples along x, y, z
-  std::optional<RegionRequest> roi;     ///< of those only these
-  std::optional<WorldRegion> region;    ///< only these; in world space, with all above applied
+  std::optional<Int3> extent = {};           ///< samples along x, y, z
+  std::optional<ScalarType> type = {};       ///< of the samples
+  std::optional<ByteOrder> order = {};       ///< of the samples
+  std::optional<std::uint64_t> offset = {};  ///< bytes before the first sample
+  std::optional<Vec3d> spacing = {};         ///< as Transform::spacing
+  std::optional<Vec3d> origin = {};          ///< as Transform::origin
+  std::optional<std::string> unit = {};      ///< as Transform::unit
+  Selection selection = {};                  ///< of a file with several volumes
+  std::optional<std::string> grid = {};      ///< of an OpenVDB file
+  std::optional<RegionRequest> bounds = {};  ///< of a sparse grid, in its own index coordinates
+  Int3 stride{1, 1, 1};                      ///< the first of so many samples along x, y, z
+  std::optional<RegionRequest> roi = {};     ///< of those only these
+  std::optional<WorldRegion> region = {};    ///< only these; in world space, with all above applied
   /// Samples of this value are missing and become NaN, so that no surface touches them. Integers
   /// become f32, those of 32 bits f64.
-  std::optional<double> nodata;
+  std::optional<double> nodata = {};
   /// Bytes that a source may take for itself: one that holds its samples in
   /// memory refuses when it needs more; nothing: as many as it likes.
-  std::optional<std::uint64_t> memory;
+  std::optional<std::uint64_t> memory = {};
   int threads = 0;  ///< with which a source may decode by itself; 0: all cores
 };
 

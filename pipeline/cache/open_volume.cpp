@@ -11,6 +11,7 @@
 #include <isobrick/convert.h>
 #include <isobrick/error.h>
 #include "bricks/zarr/metadata_files.h"
+#include "core/cancellable_progress.h"
 #include "core/file_error.h"
 #include "core/shell_word.h"
 #include "io/bytes/folder_walk.h"
@@ -222,8 +223,11 @@ struct OpenedVolume::Impl {
   }
 };
 
-OpenedVolume::OpenedVolume(const std::string& path, const OpenOptions& options, Progress& progress)
-    : impl_(std::make_unique<Impl>(path, options, progress)) {}
+OpenedVolume::OpenedVolume(const std::string& path, const OpenOptions& options,
+                           Progress& listener) {
+  CancellableProgress progress(listener, options.cancel);
+  impl_ = std::make_unique<Impl>(path, options, progress);
+}
 OpenedVolume::~OpenedVolume() = default;
 OpenedVolume::OpenedVolume(OpenedVolume&&) noexcept = default;
 

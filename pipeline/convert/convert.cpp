@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "bricks/store_writer.h"
+#include "core/cancellable_progress.h"
 #include "core/stopwatch.h"
 #include "pipeline/convert/convert_cascade.h"
 #include "pipeline/convert/convert_journal.h"
@@ -208,7 +209,8 @@ std::unique_ptr<SpooledVolume> Conversion::spool_stream() {
 }  // namespace
 
 ConvertReport convert(VolumeSource& source, const std::filesystem::path& out,
-                      const ConvertOptions& options, Progress& progress) {
+                      const ConvertOptions& options, Progress& listener) {
+  CancellableProgress progress(listener, options.cancel);
   Stopwatch watch;
   const StoreLayout layout = plan_layout(source.info(), options, source.sparse());
   const Lattice& finest = layout.levels.front().lattice;

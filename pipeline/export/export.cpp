@@ -10,6 +10,7 @@
 
 #include <isobrick/error.h>
 #include "core/budget_error.h"
+#include "core/cancellable_progress.h"
 #include "io/bytes/file.h"
 #include "io/bytes/leftovers.h"
 #include "io/bytes/output_file.h"
@@ -262,7 +263,8 @@ void export_dense(const Piece& in, Int3 piece, Workers& workers, OutputFile& out
 }  // namespace
 
 void export_volume(const StoreReader& store, const std::filesystem::path& out,
-                   const ExportOptions& options, Progress& progress) {
+                   const ExportOptions& options, Progress& listener) {
+  CancellableProgress progress(listener, options.cancel);
   if (options.isovalue && options.format != ExportFormat::vdb)
     throw UsageError("a level set can only be written as an OpenVDB file");
   const bool streamed = out == kStandardOutput;

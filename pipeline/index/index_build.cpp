@@ -12,6 +12,7 @@
 #include "bricks/store_entries.h"
 #include "bricks/stored_index.h"
 #include "bricks/zarr/json_reader.h"
+#include "core/cancellable_progress.h"
 #include "core/morton.h"
 #include "core/stopwatch.h"
 #include "index/leaf_ranges.h"
@@ -241,7 +242,8 @@ void check_index_options(const IndexOptions& options, const Lattice& lattice,
         Workers(options.threads).threads()));
 }
 
-IndexReport add_index(const fs::path& store, const IndexOptions& options, Progress& progress) {
+IndexReport add_index(const fs::path& store, const IndexOptions& options, Progress& listener) {
+  CancellableProgress progress(listener, options.cancel);
   Stopwatch watch;
   Workers workers(options.threads);
   IndexReport report =

@@ -31,7 +31,7 @@ VolumeSamples::VolumeSamples(const Volume& volume) : transform(volume.transform)
   check_extent(volume.extent);
   if (!volume.samples && !volume.read)
     throw UsageError("the volume has neither samples nor a function that reads them");
-  missing.nodata = volume.nodata;
+  if (volume.nodata) missing.nodata = as_sample(*volume.nodata, volume.type);
   missing.mask = volume.mask;
   if (volume.mask)
     missing.mask_strides = resolve_strides(volume.mask_strides, volume.extent, 1, "mask");

@@ -124,6 +124,23 @@ TEST(Documents, ThatSourcesNameAreThere) {
   EXPECT_GT(names, 10) << "the test reads the wrong folder";
 }
 
+std::string text_of(const fs::path& path) {
+  std::ifstream file(path);
+  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+}
+
+// What the guide shows is compiled and run against an installation.
+TEST(Documents, ProgramsOfTheGuideAreThoseThatAreTested) {
+  const std::string guide = text_of(sources() / "docs/guide/cpp.md");
+  for (const char* name : {"store", "array", "simulation", "cancel"}) {
+    const std::string program =
+        text_of(sources() / "tests/consumer/project" / (std::string(name) + ".cpp"));
+    const auto begin = program.find("#include");
+    ASSERT_NE(begin, std::string::npos) << name;
+    EXPECT_NE(guide.find("```cpp\n" + program.substr(begin) + "```"), std::string::npos) << name;
+  }
+}
+
 TEST(Documents, HeadingsBecomeAnchors) {
   EXPECT_EQ(anchor_of("My mesh is open"), "my-mesh-is-open");
   EXPECT_EQ(anchor_of("VTK's own searches"), "vtks-own-searches");

@@ -34,13 +34,15 @@ const std::map<std::string, Names> kMayInclude = {
     {"viewer/app",
      {"core", "io/bytes", "io/meshes", "io/volumes", "bricks", "index", "stream", "gpu", "pipeline",
       "viewer/render", "viewer/scene"}},
+    // What names all that a program of others begins with.
+    {"isobrick", {"core", "io/meshes", "io/volumes", "bricks", "surface", "pipeline"}},
 };
 
 /// The room that each public header belongs to.
 const std::map<std::string, Names> kPublicHeaders = {
     {"core",
      {"downsampling", "error", "inside", "lattice", "pod_buffer", "progress", "range", "scalar",
-      "selection", "transform", "vec"}},
+      "selection", "transform", "vec", "version"}},
     {"io/volumes", {"array_view", "volume_request", "volume_source"}},
     {"io/volumes/open", {"open_source"}},
     {"io/volumes/synth", {"synth_source"}},
@@ -60,6 +62,7 @@ const std::map<std::string, Names> kPublicHeaders = {
     {"pipeline/index", {"index_build"}},
     {"pipeline/verify", {"verify"}},
     {"pipeline/volume", {"volume", "volume_extractor"}},
+    {"isobrick", {"isobrick"}},
 };
 
 const fs::path kRoot = ISOBRICK_SOURCE_DIR;

@@ -21,6 +21,10 @@ run(${CMAKE_COMMAND} -S ${PROJECT} -B ${WORK}/build -G ${GENERATOR}
   -DCMAKE_DISABLE_FIND_PACKAGE_CUDAToolkit=ON)
 run(${CMAKE_COMMAND} --build ${WORK}/build)
 run(${WORK}/build/consumer ${WORK} ${MODULES})
+run(${WORK}/build/store ${WORK}/sphere.zarr ${WORK}/surface.ply)
+foreach(program array simulation cancel)
+  run(${WORK}/build/${program})
+endforeach()
 
 # What draws requires libraries of windows, which are not found.
 if(VIEWER)

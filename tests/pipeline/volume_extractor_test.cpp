@@ -166,6 +166,15 @@ TYPED_TEST(VolumeOf, MissingSamplesAreNaN) {
   EXPECT_TRUE(same(extract(read, options), expected));
 }
 
+// -0.1 is no float: the nearest one is meant.
+TEST(VolumeExtractor, NodataIsTheNearestSample) {
+  Field<float> field({8, 8, 8}, [](Int3 p) { return p.x < 4 ? -0.1 : 1.0; });
+  Volume volume = volume_of(field);
+  EXPECT_FALSE(extract(volume, {.isovalue = 0.5}).triangles.empty());
+  volume.nodata = -0.1;
+  EXPECT_TRUE(extract(volume, {.isovalue = 0.5}).triangles.empty());
+}
+
 TYPED_TEST(VolumeOf, OptionsAreThoseOfAStore) {
   const auto field = testing::padded_noise<TypeParam>({50, 40, 36}, 0, 4, 0, 9);
   for (const Inside inside : {Inside::above, Inside::below})

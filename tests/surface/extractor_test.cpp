@@ -67,6 +67,59 @@ TYPED_TEST(EveryType, BrickSizeBatchesAndThreadsNeverShow) {
   }
 }
 
+/// The vertex on an edge as cell_math.h defines it, in the order of one vertex at a time.
+template <class T>
+std::array<Vec3f, 2> defined_vertex(const Field<T>& field, EdgeKey edge, double isovalue) {
+  using R = Real<T>;
+  const Int3 at{edge[0], edge[1], edge[2]};
+  const auto axis = static_cast<int>(edge[3]);
+  Int3 next = at;
+  next[axis] += 1;
+  const R a = static_cast<R>(field.at(at)), b = static_cast<R>(field.at(next));
+  const auto t = static_cast<float>(edge_parameter(a, b, static_cast<R>(isovalue)));
+  const auto gradient = [&](Int3 p) {
+    Vec3f g;
+    for (int i = 0; i < 3; ++i) {
+      Int3 before = p, after = p;
+      before[i] -= p[i] > 0;
+      after[i] += p[i] + 1 < field.extent[i];
+      const R d = static_cast<R>(field.at(after)) - static_cast<R>(field.at(before));
+      g[i] = static_cast<float>(d * (after[i] - before[i] == 2 ? R(0.5) : R(1)));
+    }
+    return g;
+  };
+  const Vec3f ga = gradient(at), gb = gradient(next);
+  Vec3f where{static_cast<float>(at.x), static_cast<float>(at.y), static_cast<float>(at.z)};
+  where[axis] += t;
+  Vec3f along{0, 0, 0};
+  along[axis] = b > a ? 1.0f : -1.0f;
+  const WorldMap world;
+  return {
+      world.position(where),
+      world.unit_normal(
+          {ga.x + t * (gb.x - ga.x), ga.y + t * (gb.y - ga.y), ga.z + t * (gb.z - ga.z)}, along)};
+}
+
+TYPED_TEST(EveryType, VerticesAreThoseOfTheDefinitionToTheBit) {
+  using T = TypeParam;
+  // Numbers that need all digits of 32-bit integers and of doubles.
+  const double most = sizeof(T) >= 4 ? 4.1e9 : 120;
+  const double scale = std::is_same_v<T, std::int32_t> ? 0.5 : 1;
+  const auto field = padded_noise<T>({49, 37, 35}, 0, scale * most, T{0}, 21);
+  const double isovalue = std::floor(scale * most * 0.4) + 0.5;
+  const Mesh mesh = extract(field, {.isovalue = isovalue, .normals = true});
+  int looked_at = 0;
+  for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
+    const EdgeKey edge = edge_of(mesh.positions[i]);
+    if (edge[3] < 0) continue;  // so near to a sample that its coordinate is rounded to it
+    const auto [position, normal] = defined_vertex(field, edge, isovalue);
+    ASSERT_EQ(mesh.positions[i], position) << i;
+    ASSERT_EQ(mesh.normals[i], normal) << i;
+    ++looked_at;
+  }
+  EXPECT_GT(looked_at, 10000);
+}
+
 TYPED_TEST(EveryType, ChunkLocalMeshHasTheSameTriangles) {
   using T = TypeParam;
   const auto field = padded_noise<T>({70, 40, 37}, 0, 100, T{0}, 5);
