@@ -197,8 +197,8 @@ ScreenshotReport draw_shots(SceneRenderer& picture, const std::vector<Screenshot
 int draw(const ViewArguments& arguments, Console& console) {
   const OpenedVolume input =
       open_input(arguments.input, arguments.budgets.memory, arguments.budgets.threads, console);
-  const auto store = std::make_shared<const StoreReader>(input.store().info().path,
-                                                         input.store().info().selection);
+  const auto store =
+      std::make_shared<const StoreReader>(input.store().storage(), input.store().info().selection);
   const std::vector<double> isovalues = isovalues_of(arguments, *store, console);
   const std::vector<MeshStyle> styles =
       styles_of(arguments.picture, std::max<std::size_t>(isovalues.size(), 1), "isovalues");
@@ -263,8 +263,9 @@ OpenedVolume open_shown(const ViewArguments& arguments, Console& console) {
   InputArguments input = arguments.input;
   if (is_zarr(input.path))
     input.volume.selection = image_volumes(input.path, input.volume.selection).selection;
-  // The window computes ranges that are missing.
-  return open_input(input, arguments.budgets.memory, arguments.budgets.threads, console, false);
+  // The window computes ranges that are missing, where they can be added.
+  return open_input(input, arguments.budgets.memory, arguments.budgets.threads, console,
+                    !std::filesystem::is_directory(input.path));
 }
 
 int run_view(const ViewArguments& arguments, Console& console) {
@@ -292,9 +293,9 @@ int run_view(const ViewArguments& arguments, Console& console) {
   {
     ViewerWindow window(options);
     if (input) {
-      const StoreInfo& info = input->store().info();
-      window.open(info.path, info.path == arguments.input.path ? arguments.input.volume.selection
-                                                               : info.selection);
+      const std::filesystem::path store = input->store().storage()->local_path();
+      window.open(store, store == arguments.input.path ? arguments.input.volume.selection
+                                                       : input->store().info().selection);
     }
     window.run();
   }  // a conversion that still ran has left nothing

@@ -103,7 +103,8 @@ std::string text_of(const VolumeRequest& r) {
 /// What a store is made of.
 std::string key_of(const std::string& path, const VolumeInfo& info, const VolumeRequest& request) {
   std::string key = fmt::format("{}\n{}", kKeyVersion, text_of(request));
-  if (is_zarr(path)) return key + identity_of(path) + identity_of_folder(path);
+  if (fs::is_directory(path) && is_zarr(path))
+    return key + identity_of(path) + identity_of_folder(path);
   for (const fs::path& file : info.files) key += identity_of(file);
   return key;
 }
@@ -166,7 +167,7 @@ struct OpenedVolume::Impl {
       fill_temporary(path, *source, options, progress);
     else
       fill_entry(path, *source, options, progress);
-    if (converted && in_place)
+    if (converted && in_place && fs::is_directory(path))
       notes.push_back(fmt::format("without that copy: '{}' adds what it lacks in place",
                                   "isobrick index " + shell_word(path)));
   }

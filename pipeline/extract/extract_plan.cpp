@@ -60,7 +60,7 @@ void check_transform(const StoreInfo& info, const LevelInfo& level) {
     throw Error(fmt::format(
         "the spacing or origin of '{}' does not fit the 32-bit coordinates of a mesh (1e-30 to "
         "1e30); convert it with another --spacing, --origin or unit",
-        info.path.string()));
+        info.name));
 }
 
 /// What the CUDA driver and its context take of the host's memory.
@@ -124,7 +124,7 @@ ExtractRequest check_request(const StoreReader& store, const ExtractOptions& opt
   const auto levels = static_cast<int>(info.levels.size());
   if (options.level < 0 || options.level >= levels)
     throw UsageError(fmt::format("level {} does not exist: '{}' has levels 0 to {}", options.level,
-                                 info.path.string(), levels - 1));
+                                 info.name, levels - 1));
   if (std::isnan(options.isovalue)) throw UsageError("the isovalue is not a number");
   ExtractRequest request;
   request.level = &info.levels[static_cast<std::size_t>(options.level)];
