@@ -179,7 +179,7 @@ fs::path store_for(const fs::path& input) {
   const fs::path full = fs::absolute(input);
   const fs::path folder = access(full.parent_path().c_str(), W_OK) == 0 ? full.parent_path()
                                                                         : fs::temp_directory_path();
-  const std::string stem = full.stem().string();
+  const std::string stem = volume_stem(full.string());
   fs::path store = folder / (stem + ".zarr");
   const auto taken = [](const fs::path& path) {
     return fs::exists(path) || fs::exists(staging_path(path));

@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include <isobrick/error.h>
+#include "bricks/storage/open_storage.h"
 #include "bricks/zarr/metadata_files.h"
 #include "core/file_error.h"
 #include "pipeline/index/add_ranges.h"
@@ -18,6 +19,14 @@
 // The volume of a window: opened, dropped, converted, chosen from an image.
 
 namespace isobrick {
+namespace {
+
+/// Whether the shown volume of a Zarr lacks ranges.
+bool lacks_ranges(const std::filesystem::path& path, const Selection& selection) {
+  return !has_all_ranges(StoreReader(path, image_volumes(path, selection).selection));
+}
+
+}  // namespace
 
 /// Replaces the volume; the settings stay.
 void ViewerWindow::load(const std::filesystem::path& path, const Selection& selection) {
@@ -102,15 +111,16 @@ ConvertOptions ViewerWindow::import_options() const {
 
 /// Starts to compute the ranges that a volume lacks; returns false if it lacks none.
 bool ViewerWindow::begin_ranges(const std::filesystem::path& path, const Selection& selection) {
+  if (!lacks_ranges(path, selection)) return false;
   const Selection shown = image_volumes(path, selection).selection;
-  if (has_all_ranges(StoreReader(path, shown))) return false;
   state_.import = std::make_unique<ImportJob>(path, shown, import_options());
   return true;
 }
 
 void ViewerWindow::drop(const std::filesystem::path& path) {
   try {
-    if (!is_zarr(path))
+    // A zip cannot be added to.
+    if (!is_zarr(path) || (is_zip(path) && lacks_ranges(path, {})))
       state_.import = std::make_unique<ImportJob>(path, store_for(path), import_options());
     else if (!begin_ranges(path, {}))
       open(path);
