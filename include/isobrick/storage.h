@@ -31,8 +31,8 @@ class StoredObject {
 };
 
 /// What a store is read from: objects by key, a relative name such as "0/c/0/0/1", whose parts "/"
-/// separates. No key has an empty part, "." or "..". Read only and thread-safe. Whoever reads from
-/// a place of their own derives from this class, or uses function_storage().
+/// separates. No key has an empty part, "." or "..". Read only and thread-safe. For a place of your
+/// own derive from this class, or use function_storage().
 class Storage {
  public:
   virtual ~Storage() = default;
