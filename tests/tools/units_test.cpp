@@ -207,7 +207,7 @@ TEST(OutputName, StemOfAnInput) {
   for (const auto& [path, stem] :
        {std::pair{"data/scan.nii.gz", "scan"}, std::pair{"series/", "series"},
         std::pair{"a/scan.h5:/array", "scan"}, std::pair{"x.zarr///", "x"}, std::pair{"raw", "raw"},
-        std::pair{"a.b.nrrd", "a.b"}})
+        std::pair{"a.b.nrrd", "a.b"}, std::pair{"x.zarr.zip", "x"}})
     EXPECT_EQ(stem_of_input(path), stem) << path;
   EXPECT_THROW(stem_of_input("-"), UsageError);
 }

@@ -153,6 +153,7 @@ TEST(StoreFor, TakesANameThatIsFree) {
   EXPECT_EQ(store_for(dir / "a.nrrd"), dir / "a-2.zarr");
   std::filesystem::create_directory(dir / "a-2.zarr.partial");
   EXPECT_EQ(store_for(dir / "a.nrrd"), dir / "a-3.zarr");
+  EXPECT_EQ(store_for(dir / "b.zarr.zip"), dir / "b.zarr");
 }
 
 }  // namespace
