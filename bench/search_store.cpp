@@ -84,7 +84,7 @@ int run(int argc, char** argv) {
   for (int i = 2; i < argc; ++i) {
     const double isovalue = std::atof(argv[i]);
     measure(argv[1], store, isovalue, {});
-    for (const std::string& kind : stored_index_kinds(argv[1], 0))
+    for (const std::string& kind : stored_index_kinds(store, 0))
       for (const bool only_if_few : {false, true})
         measure(argv[1], store, isovalue, {parse_index_kind(kind), only_if_few});
   }

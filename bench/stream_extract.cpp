@@ -113,6 +113,7 @@ void drop_from_cache(const std::string& store) {
 
 /// Reading alone, on all cores.
 double read_alone(const StoreReader& store, int level, const std::vector<Int3>& bricks) {
+  const std::filesystem::path folder = store.storage()->local_path();
   std::map<std::string, int> files;
   struct Piece {
     int file;
@@ -122,8 +123,8 @@ double read_alone(const StoreReader& store, int level, const std::vector<Int3>& 
   std::uint64_t most = 0;
   for (const Int3 b : bricks)
     if (const auto at = store.locate(level, b)) {
-      auto [file, added] = files.try_emplace(at->file.string(), -1);
-      if (added) file->second = open(at->file.c_str(), O_RDONLY | O_CLOEXEC);
+      auto [file, added] = files.try_emplace(at->key, -1);
+      if (added) file->second = open((folder / at->key).c_str(), O_RDONLY | O_CLOEXEC);
       pieces.push_back({file->second, *at});
       most = std::max(most, at->size);
     }

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <isobrick/storage.h>
 #include "bricks/zarr/metadata_files.h"
 
 namespace isobrick {
@@ -18,7 +19,7 @@ Index place_on(const VolumeAxis& axis, const Selection& selection) {
 }
 
 ImageVolumes image_volumes(const std::filesystem::path& path, const Selection& selection) {
-  const MetadataFiles files = read_metadata_files(path);
+  const MetadataFiles files = read_metadata_files(*open_storage(path));
   ImageVolumes volumes{.axes = open_axes(files.image, files.levels.front().array, {}),
                        .channel_names = files.image.channel_names,
                        .selection = selection};

@@ -16,7 +16,7 @@ struct ImageVolumes {
 };
 
 /// Those of the image at `path`: where `selection` leaves an axis open, the first along it. Throws
-/// what read_metadata_files() does.
+/// what open_storage() and read_metadata_files() do.
 ImageVolumes image_volumes(const std::filesystem::path& path, const Selection& selection = {});
 
 /// What chooses along an axis: the selection's channel or its time.

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <utility>
 
 #include <isobrick/error.h>
 #include <isobrick/pod_buffer.h>
@@ -12,6 +13,7 @@
 #include "bricks/ranges/lru_cache.h"
 #include "bricks/ranges/range_array.h"
 #include "bricks/ranges/stored_ranges.h"
+#include "bricks/storage/storage_keys.h"
 #include "bricks/zarr/array_metadata.h"
 #include "bricks/zarr/level_description.h"
 #include "bricks/zarr/metadata_files.h"
@@ -19,14 +21,13 @@
 #include "bricks/zarr/shard_index.h"
 #include "bricks/zarr/volume_choice.h"
 #include "core/shell_word.h"
-#include "io/bytes/file.h"
 
 namespace isobrick {
 namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr std::uint64_t kMaxOpenFiles = 128;
+constexpr std::uint64_t kMaxOpenObjects = 128;
 
 // No encoder makes a brick much larger than it is; a length beyond is damage,
 // and must not make the reader allocate that much memory.
@@ -52,18 +53,18 @@ std::uint64_t decode_extra(const StoreInfo& info, int threads) {
 struct StoreReader::Impl {
   struct Level {
     ArrayMetadata metadata;
-    std::filesystem::path folder;
+    std::string folder;  // a key
     VolumePlace place;
     ShardGrid grid;
     std::shared_ptr<const RangeArrayReader> brick_ranges, block_ranges;  // null: none
     std::shared_ptr<const BrickChecksums> checksums;                     // null: none
   };
   struct Place {
-    std::shared_ptr<const File> file;
+    std::shared_ptr<const StoredObject> object;
     std::uint64_t offset = 0, size = 0;
   };
 
-  void open(const std::filesystem::path& path, const Selection& selection);
+  void open(const Selection& selection);
   std::optional<StoredRanges> find_ranges() const;
   void open_level(const ImageMetadata::Level& described, MetadataFiles::Level&& read);
   void open_ranges(int level, const RangeChecksums& checksums);
@@ -71,15 +72,16 @@ struct StoreReader::Impl {
   [[noreturn]] void damaged(int level, Int3 b, const Place& place, const std::string& what) const;
   void widen_brick(int level, Int3 b, const Place& place, const std::byte* stored,
                    std::byte* out) const;
-  std::filesystem::path shard_path(int level, Int3 s) const;
-  std::shared_ptr<const File> shard_file(int level, Int3 s);
+  Int3 shard_of(int level, Int3 b) const;
+  std::string shard_key(int level, Int3 s) const;
+  std::shared_ptr<const StoredObject> shard_object(int level, Int3 s);
   std::shared_ptr<const ShardIndex> shard_index(int level, Int3 s);
   std::optional<Place> find_unchecked(int level, Int3 b);
   std::optional<Place> find(int level, Int3 b);
   void check_content(int level, Int3 b, const Place& place, std::uint32_t checksum);
   std::uint32_t read(int level, Int3 b, const Place& place, std::byte* out);
   RangeTable ranges(int level, Box3 box, bool blocks);
-  std::uint64_t key(int level, Int3 s) const {
+  std::uint64_t shard_number(int level, Int3 s) const {
     return static_cast<std::uint64_t>(linear_index(s, at(level).grid.shards)) * 64 +
            static_cast<std::uint64_t>(level);
   }
@@ -88,25 +90,26 @@ struct StoreReader::Impl {
     return info.levels[static_cast<std::size_t>(level)].lattice;
   }
 
+  std::shared_ptr<const Storage> storage;
   StoreInfo info;
   VolumeChoice volume_choice;
   std::vector<Level> levels;
   std::atomic<std::uint64_t> bytes_read = 0;
   std::atomic<std::uint64_t> brick_bytes_read = 0, brick_bytes_decoded = 0;
   std::atomic<Clock::rep> read_ticks = 0, decode_ticks = 0;
-  LruCache<File> files{kMaxOpenFiles};
+  LruCache<StoredObject> objects{kMaxOpenObjects};  // null: there is none
   LruCache<ShardIndex> indices{kIndexCacheBytes};
 };
 
-void StoreReader::Impl::open(const std::filesystem::path& path, const Selection& selection) {
-  info.path = path;
+void StoreReader::Impl::open(const Selection& selection) {
+  info.name = storage->name();
   info.selection = selection;
-  MetadataFiles metadata = read_metadata_files(path);
+  MetadataFiles metadata = read_metadata_files(*storage);
   const ImageMetadata& image = metadata.image;
   info.ours = image.ours;
   info.metadata_crc32c = metadata.crc32c;
-  volume_choice = choose_volume(path, image, metadata.levels.front().array, selection);
-  info.additions = volume_choice.folder.empty() ? path : path / volume_choice.folder;
+  volume_choice = choose_volume(info.name, image, metadata.levels.front().array, selection);
+  info.additions = volume_choice.folder;
   for (std::size_t i = 0; i < image.levels.size(); ++i)
     open_level(image.levels[i], std::move(metadata.levels[i]));
   std::optional<bool> may_have_nan = image.may_have_nan;
@@ -125,13 +128,13 @@ void StoreReader::Impl::open(const std::filesystem::path& path, const Selection&
 
 // The ranges of the image as it is now: if its metadata was changed since, they are of another.
 std::optional<StoredRanges> StoreReader::Impl::find_ranges() const {
-  std::optional<StoredRanges> stored = read_stored_ranges(info.additions);
+  std::optional<StoredRanges> stored = read_stored_ranges(*storage, info.additions);
   if (!stored) return std::nullopt;
   if (stored->image_crc32c == info.metadata_crc32c && stored->levels.size() == levels.size())
     return stored;
   if (info.ours)
     throw DamageError(fmt::format("{}: these are the ranges of another store",
-                                  quoted(ranges_file(info.additions))));
+                                  quoted(*storage, ranges_file(info.additions))));
   return std::nullopt;
 }
 
@@ -139,9 +142,10 @@ std::optional<StoredRanges> StoreReader::Impl::find_ranges() const {
 // before anybody walks over it.
 void StoreReader::Impl::open_ranges(int level, const RangeChecksums& checksums) {
   const Lattice& samples = lattice(level);
-  const auto open = [&](const std::filesystem::path& folder, Int3 items, std::uint32_t crc32c) {
+  const auto open = [&](const std::string& folder, Int3 items, std::uint32_t crc32c) {
     using Ranges = std::shared_ptr<const RangeArrayReader>;
-    auto ranges = std::make_shared<const RangeArrayReader>(folder, items, samples.type, crc32c);
+    auto ranges =
+        std::make_shared<const RangeArrayReader>(storage, folder, items, samples.type, crc32c);
     return ranges->exists() ? Ranges(std::move(ranges)) : Ranges();
   };
   Level& l = levels[static_cast<std::size_t>(level)];
@@ -150,8 +154,8 @@ void StoreReader::Impl::open_ranges(int level, const RangeChecksums& checksums) 
   l.block_ranges =
       open(block_range_folder(info.additions, level), samples.blocks(), checksums.blocks);
   // Those that are missing are damage: else nobody would notice bricks of another place.
-  l.checksums = std::make_shared<const BrickChecksums>(brick_checksum_folder(info.additions, level),
-                                                       samples.bricks(), checksums.content);
+  l.checksums = std::make_shared<const BrickChecksums>(
+      storage, brick_checksum_folder(info.additions, level), samples.bricks(), checksums.content);
   info.levels[static_cast<std::size_t>(level)].block_ranges_crc32c = checksums.blocks;
 }
 
@@ -160,7 +164,7 @@ void StoreReader::Impl::open_level(const ImageMetadata::Level& described,
   Level level;
   level.folder = std::move(read.folder);
   level.metadata = std::move(read.array);
-  const std::string where = quoted(read.file);
+  const std::string where = quoted(*storage, read.file);
   level.place = place_volume(level.metadata, volume_choice.place, where);
   info.levels.push_back(describe_level(level.metadata, level.place, described.transform, where));
   level.grid = ShardGrid(info.levels.back());
@@ -175,7 +179,7 @@ void StoreReader::Impl::open_level(const ImageMetadata::Level& described,
 
 void StoreReader::Impl::check_brick(int level, Int3 b) const {
   if (level < 0 || static_cast<std::size_t>(level) >= levels.size())
-    throw UsageError(fmt::format("'{}' has no level {}", info.path.string(), level));
+    throw UsageError(fmt::format("'{}' has no level {}", info.name, level));
   if (!Box3{{0, 0, 0}, lattice(level).bricks()}.contains(b))
     throw UsageError(fmt::format("level {} has no brick ({}, {}, {})", level, b.x, b.y, b.z));
 }
@@ -183,8 +187,7 @@ void StoreReader::Impl::check_brick(int level, Int3 b) const {
 void StoreReader::Impl::damaged(int level, Int3 b, const Place& place,
                                 const std::string& what) const {
   throw DamageError(fmt::format("level {}, brick ({}, {}, {}): '{}' at {} + {}: {}", level, b.x,
-                                b.y, b.z, place.file->path().string(), place.offset, place.size,
-                                what));
+                                b.y, b.z, place.object->name(), place.offset, place.size, what));
 }
 
 void StoreReader::Impl::widen_brick(int level, Int3 b, const Place& place, const std::byte* stored,
@@ -194,45 +197,49 @@ void StoreReader::Impl::widen_brick(int level, Int3 b, const Place& place, const
           static_cast<std::size_t>(volume(lattice(level).brick)));
   } catch (const Error& e) {
     throw Error(fmt::format("level {}, brick ({}, {}, {}): '{}': {}", level, b.x, b.y, b.z,
-                            place.file->path().string(), e.what()));
+                            place.object->name(), e.what()));
   }
 }
 
-std::filesystem::path StoreReader::Impl::shard_path(int level, Int3 s) const {
-  std::vector<Index> coordinates = at(level).place.chunk;
-  coordinates.insert(coordinates.end(), {s.z, s.y, s.x});
-  return at(level).folder / at(level).metadata.chunk_key(coordinates);
+/// The shard of a brick, or its chunk where there are no shards.
+Int3 StoreReader::Impl::shard_of(int level, Int3 b) const {
+  return at(level).metadata.sharding ? at(level).grid.shard_of(b) : b;
 }
 
-std::shared_ptr<const File> StoreReader::Impl::shard_file(int level, Int3 s) {
-  return files.get(key(level, s), [&] {
-    auto file = std::make_shared<const File>(open_if_exists(shard_path(level, s)));
-    return std::pair(std::move(file), std::uint64_t{1});
+std::string StoreReader::Impl::shard_key(int level, Int3 s) const {
+  std::vector<Index> coordinates = at(level).place.chunk;
+  coordinates.insert(coordinates.end(), {s.z, s.y, s.x});
+  return join_key(at(level).folder, at(level).metadata.chunk_key(coordinates));
+}
+
+std::shared_ptr<const StoredObject> StoreReader::Impl::shard_object(int level, Int3 s) {
+  return objects.get(shard_number(level, s), [&] {
+    return std::pair(storage->open(shard_key(level, s)), std::uint64_t{1});
   });
 }
 
 std::shared_ptr<const ShardIndex> StoreReader::Impl::shard_index(int level, Int3 s) {
-  return indices.get(key(level, s), [&] {
+  return indices.get(shard_number(level, s), [&] {
     const std::uint64_t bricks = at(level).grid.shard_bricks() * at(level).place.shard_volumes;
-    const auto file = shard_file(level, s);
-    // A shard without a file has only absent bricks.
-    if (!*file) return std::pair(std::make_shared<const ShardIndex>(0), index_weight(0));
+    const auto object = shard_object(level, s);
+    // A shard without an object has only absent bricks.
+    if (!object) return std::pair(std::make_shared<const ShardIndex>(0), index_weight(0));
     const ArrayMetadata::Sharding& sharding = *at(level).metadata.sharding;
-    const std::uint64_t size = file->size();
+    const std::uint64_t size = object->size();
     const std::uint64_t index_size = ShardIndex::encoded_size(bricks, sharding.index_has_crc);
     try {
       if (size < index_size)
         throw DamageError(
             fmt::format("{} bytes are too few for the index of {} bricks", size, bricks));
       std::vector<std::byte> bytes(index_size);
-      file->read_at(sharding.index_at_end ? size - index_size : 0, bytes);
+      object->read(sharding.index_at_end ? size - index_size : 0, bytes);
       bytes_read += index_size;
       return std::pair(std::make_shared<const ShardIndex>(
                            ShardIndex::decode(bytes, sharding.index_has_crc, size)),
                        index_weight(bricks));
     } catch (const DamageError& e) {
       throw DamageError(fmt::format("level {}, shard ({}, {}, {}): '{}': {}", level, s.x, s.y, s.z,
-                                    file->path().string(), e.what()));
+                                    object->name(), e.what()));
     }
   });
 }
@@ -240,9 +247,10 @@ std::shared_ptr<const ShardIndex> StoreReader::Impl::shard_index(int level, Int3
 std::optional<StoreReader::Impl::Place> StoreReader::Impl::find_unchecked(int level, Int3 b) {
   check_brick(level, b);
   if (!at(level).metadata.sharding) {
-    const auto file = shard_file(level, b);
-    if (*file) return Place{file, 0, file->size()};
-    return std::nullopt;
+    auto object = shard_object(level, b);
+    if (!object) return std::nullopt;
+    const std::uint64_t size = object->size();
+    return Place{std::move(object), 0, size};
   }
   const ShardGrid& grid = at(level).grid;
   const Int3 s = grid.shard_of(b);
@@ -251,22 +259,22 @@ std::optional<StoreReader::Impl::Place> StoreReader::Impl::find_unchecked(int le
   const ShardIndex::Entry entry =
       (*index)[at(level).place.in_shard * grid.shard_bricks() + grid.place_in_shard(b)];
   if (entry.absent()) return std::nullopt;
-  return Place{shard_file(level, s), entry.offset, entry.size};
+  return Place{shard_object(level, s), entry.offset, entry.size};
 }
 
-// To Zarr a shard without a file holds nothing but fill values, so that a lost
+// To Zarr a shard without an object holds nothing but fill values, so that a lost
 // file would pass for empty space. The checksums know better.
 std::optional<StoreReader::Impl::Place> StoreReader::Impl::find(int level, Int3 b) {
   const std::optional<Place> place = find_unchecked(level, b);
   const auto& checksums = at(level).checksums;
   if (place || !checksums || checksums->at(b, bytes_read) == kAbsentBrick) return place;
-  const Int3 s = at(level).metadata.sharding ? at(level).grid.shard_of(b) : b;
-  const std::string path = shard_path(level, s).string();
-  if (!*shard_file(level, s))
-    throw DamageError(fmt::format("level {}, shard ({}, {}, {}): '{}' is missing, but has bricks",
-                                  level, s.x, s.y, s.z, path));
-  throw DamageError(fmt::format("level {}, brick ({}, {}, {}): '{}' lacks it: {}", level, b.x, b.y,
-                                b.z, path, why_other_content(info)));
+  const Int3 s = shard_of(level, b);
+  const std::string shard = quoted(*storage, shard_key(level, s));
+  if (!shard_object(level, s))
+    throw DamageError(fmt::format("level {}, shard ({}, {}, {}): {} is missing, but has bricks",
+                                  level, s.x, s.y, s.z, shard));
+  throw DamageError(fmt::format("level {}, brick ({}, {}, {}): {} lacks it: {}", level, b.x, b.y,
+                                b.z, shard, why_other_content(info)));
 }
 
 void StoreReader::Impl::check_content(int level, Int3 b, const Place& place,
@@ -284,31 +292,38 @@ RangeTable StoreReader::Impl::ranges(int level, Box3 box, bool blocks) {
   check_brick(level, {0, 0, 0});
   const auto& reader = blocks ? at(level).block_ranges : at(level).brick_ranges;
   if (!reader)
-    throw Error(fmt::format("level {} of '{}' has no ranges yet; run: {}", level,
-                            info.path.string(), index_command(info)));
+    throw Error(fmt::format("level {} of '{}' has no ranges yet; run: {}", level, info.name,
+                            index_command(info)));
   return reader->read(box, bytes_read);
 }
 
 std::string index_command(const StoreInfo& info) {
-  std::string command = "isobrick index " + shell_word(info.path.string());
+  std::string command = "isobrick index " + shell_word(info.name);
   if (info.selection.channel) command += fmt::format(" --channel {}", *info.selection.channel);
   if (info.selection.time) command += fmt::format(" --time {}", *info.selection.time);
   return command;
 }
 
 StoreReader::StoreReader(const std::filesystem::path& path, const Selection& selection)
+    : StoreReader(open_storage(path), selection) {}
+
+StoreReader::StoreReader(std::shared_ptr<const Storage> storage, const Selection& selection)
     : impl_(std::make_unique<Impl>()) {
-  impl_->open(path, selection);
+  impl_->storage = std::move(storage);
+  impl_->open(selection);
 }
 
 StoreReader::~StoreReader() = default;
 
 const StoreInfo& StoreReader::info() const { return impl_->info; }
 
+const std::shared_ptr<const Storage>& StoreReader::storage() const { return impl_->storage; }
+
 std::optional<BrickLocation> StoreReader::locate(int level, Int3 b) const {
   const auto place = impl_->find(level, b);
   if (!place) return std::nullopt;
-  return BrickLocation{place->file->path(), place->offset, place->size};
+  return BrickLocation{impl_->shard_key(level, impl_->shard_of(level, b)), place->offset,
+                       place->size};
 }
 
 bool StoreReader::read_brick(int level, Int3 b, std::byte* out) const {
@@ -345,7 +360,7 @@ std::uint32_t StoreReader::Impl::read(int level, Int3 b, const Place& place, std
   const std::span to = volumes.chunk_volumes > 1 ? std::span(several) : std::span(at_end, stored);
   try {
     const auto start = Clock::now();
-    place.file->read_at(place.offset, encoded);
+    place.object->read(place.offset, encoded);
     const auto end_of_read = Clock::now();
     bytes_read += place.size;
     brick_bytes_read += place.size;
@@ -366,7 +381,8 @@ std::uint32_t StoreReader::Impl::read(int level, Int3 b, const Place& place, std
 }
 
 void StoreReader::will_need(int level, Int3 b) const {
-  if (const auto place = impl_->find(level, b)) place->file->will_need(place->offset, place->size);
+  if (const auto place = impl_->find(level, b))
+    place->object->will_need(place->offset, place->size);
 }
 
 std::uint64_t StoreReader::bytes_read() const { return impl_->bytes_read; }

@@ -137,12 +137,12 @@ void StoreWriter::Impl::open_levels() {
       return std::make_unique<ItemArrayWriter>(folder, items, std::move(array), *publisher);
     };
     const Int3 bricks = l.lattice.bricks(), blocks = l.lattice.blocks();
-    l.brick_ranges = writer(brick_range_folder(dir, number), bricks,
+    l.brick_ranges = writer(dir / brick_range_folder("", number), bricks,
                             range_array_metadata(bricks, l.lattice.type));
-    l.block_ranges = writer(block_range_folder(dir, number), blocks,
+    l.block_ranges = writer(dir / block_range_folder("", number), blocks,
                             range_array_metadata(blocks, l.lattice.type));
     l.brick_checksums =
-        writer(brick_checksum_folder(dir, number), bricks, checksum_array_metadata(bricks));
+        writer(dir / brick_checksum_folder("", number), bricks, checksum_array_metadata(bricks));
   }
 }
 
@@ -321,7 +321,7 @@ void StoreWriter::put_block_ranges(int level, Box3 box, std::span<const std::byt
 }
 
 void StoreWriter::put_histogram(const SampleCounts& counts) {
-  impl_->histogram = write_histogram(histogram_folder(impl_->dir), counts, *impl_->publisher);
+  impl_->histogram = write_histogram(impl_->dir / histogram_folder(""), counts, *impl_->publisher);
 }
 
 void StoreWriter::Impl::publish_root(const ImageMetadata& image) {
@@ -370,7 +370,7 @@ void StoreWriter::finish(bool may_have_nan,
       layout_checksum(image, layout, quoted(impl_->dir / root_file(image, layout.ome).name));
   ranges.image_crc32c = *image.checksum;
   if (ranges.levels.size() == impl_->levels.size())
-    publisher.write(ranges_file(impl_->dir), to_json(ranges));
+    publisher.write(impl_->dir / ranges_file(""), to_json(ranges));
   // Only now, with everything on disk, does the directory become a store.
   impl_->publish_root(image);
   if (window) {

@@ -125,8 +125,9 @@ void BrickReader::fail(Int3 b, const ValueRange<double>& stored,
                        const ValueRange<double>& found) const {
   const auto place = store_.locate(level_, b);
   const std::string where =
-      place ? fmt::format("'{}' at {} + {}", place->file.string(), place->offset, place->size)
-            : fmt::format("'{}': no such brick", store_.info().path.string());
+      place ? fmt::format("'{}' at {} + {}", store_.storage()->name_of(place->key), place->offset,
+                          place->size)
+            : fmt::format("'{}': no such brick", store_.info().name);
   throw DamageError(fmt::format(
       "level {}, brick ({}, {}, {}): {}: its samples go from {} to {}, but its stored range is {} "
       "to {}: it belongs to another place or store; see: isobrick verify",

@@ -40,7 +40,7 @@ std::shared_ptr<const BrickSource> store_bricks(std::shared_ptr<const StoreReade
       throw Error(
           fmt::format("level {} of '{}' has no ranges yet, without which nothing can be shown; "
                       "run: {}",
-                      level, store->info().path.string(), index_command(store->info())));
+                      level, store->info().name, index_command(store->info())));
   return std::make_shared<StoreBricks>(std::move(store));
 }
 

@@ -97,7 +97,7 @@ std::vector<Int3> IndexSearch::active_bricks(const IndexChunk& chunk, Int3 c, Bo
   std::vector<std::byte> bytes;
   if (!chunk.read(IndexLayout::kDirectory, bytes))
     throw DamageError(fmt::format("level {}, {} index: '{}' has no directory", level_,
-                                  name_of(kind_), chunk.path().string()));
+                                  name_of(kind_), chunk.name()));
   std::vector<Int3> bricks;
   try {
     const auto words = marks(open_index_part(bytes, kind_, layout.type, box.extent()), isovalue);
@@ -126,7 +126,7 @@ std::uint64_t IndexSearch::active_blocks(const IndexChunk& chunk, Int3 brick,
       throw DamageError(
           fmt::format("'{}' has no part for it, but by its directory the "
                       "isovalue is in its range",
-                      chunk.path().string()));
+                      chunk.name()));
   } catch (const DamageError& e) {
     throw DamageError(index_brick_name(level_, kind_, brick) + ": " + e.what());
   }

@@ -24,7 +24,9 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::ordered_json;
 
-std::uint64_t directory_bytes(const fs::path& path) {
+/// Of a store in a folder or a zip.
+std::uint64_t bytes_of(const fs::path& path) {
+  if (!fs::is_directory(path)) return fs::file_size(path);
   std::uint64_t bytes = 0;
   walk_folder(path, [&](const fs::path& file, fs::file_type type) {
     if (type == fs::file_type::regular) bytes += fs::file_size(path / file);
@@ -74,12 +76,12 @@ struct IndexFacts {
 std::vector<IndexFacts> indexes_of(const StoreReader& store, bool stats) {
   std::map<std::string, IndexFacts> kinds;
   for (int level = 0; level < static_cast<int>(store.info().levels.size()); ++level)
-    for (const std::string& kind : stored_index_kinds(store.info().additions, level)) {
+    for (const std::string& kind : stored_index_kinds(store, level)) {
       const StoredIndex index(store, level, kind);
       IndexFacts& facts = kinds[kind];
       if (facts.level_bytes.empty()) facts.leaf = index.layout().leaf;
       facts.kind = kind;
-      facts.level_bytes[level] = stats ? std::optional(index_bytes(index)) : std::nullopt;
+      facts.level_bytes[level] = stats ? std::optional(index.bytes()) : std::nullopt;
     }
   std::vector<IndexFacts> list;
   for (auto& [kind, facts] : kinds) list.push_back(std::move(facts));
@@ -123,7 +125,7 @@ StoreFacts gather(const StoreReader& store, bool stats, std::uint64_t memory, Pr
   facts.has_ranges = store.has_ranges(0);
   facts.indexes = indexes_of(store, stats);
   if (stats) {
-    facts.bytes = directory_bytes(info.path);
+    facts.bytes = bytes_of(store.storage()->local_path());
     for (std::size_t i = 0; i < facts.stored.size(); ++i)
       facts.stored[i] = stored_bricks(store, static_cast<int>(i));
   }

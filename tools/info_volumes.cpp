@@ -8,6 +8,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include <isobrick/storage.h>
 #include "bricks/zarr/metadata_files.h"
 #include "bricks/zarr/volume_choice.h"
 #include "core/printable.h"
@@ -98,7 +99,7 @@ std::string text_of(const std::filesystem::path& path, const MetadataFiles& file
 }  // namespace
 
 bool list_volumes(const std::filesystem::path& path, const Selection& selection, Console& console) {
-  const MetadataFiles files = read_metadata_files(path);
+  const MetadataFiles files = read_metadata_files(*open_storage(path));
   const std::vector<VolumeAxis> axes =
       open_axes(files.image, files.levels.front().array, selection);
   if (axes.empty()) return false;

@@ -102,8 +102,9 @@ void check_store(const std::string& path) {
   std::error_code ignored;
   const fs::file_status status = fs::status(path, ignored);
   if (!fs::exists(status)) refuse_missing(path);
+  if (is_zarr(path)) return;
   if (fs::is_regular_file(status)) refuse_file(path);
-  if (fs::is_directory(status) && !is_zarr(path)) refuse_folder(path);
+  if (fs::is_directory(status)) refuse_folder(path);
 }
 
 void refuse_folder_of_zarr(const std::string& path) {
@@ -121,7 +122,7 @@ void check_input(const std::string& path) {
     if (store_name || fs::exists(staging_path(path))) refuse_missing(path);
     throw Error(fmt::format("'{}' does not exist", path));
   }
-  if (store_name && fs::is_regular_file(status)) refuse_file(file);
+  if (store_name && fs::is_regular_file(status) && !is_zarr(file)) refuse_file(file);
   if (fs::is_regular_file(status)) refuse_meshes_and_pictures(file, "volume");
 }
 

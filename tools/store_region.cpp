@@ -9,8 +9,8 @@ namespace isobrick::tools {
 Box3 store_region(const StoreReader& store, int level, const RegionArguments& region) {
   const auto& levels = store.info().levels;
   if (level < 0 || static_cast<std::size_t>(level) >= levels.size())
-    throw UsageError(fmt::format("'{}' has no level {}; its levels are 0 to {}",
-                                 store.info().path.string(), level, levels.size() - 1));
+    throw UsageError(fmt::format("'{}' has no level {}; its levels are 0 to {}", store.info().name,
+                                 level, levels.size() - 1));
   const LevelInfo& info = levels[static_cast<std::size_t>(level)];
   const Box3 box = resolve_region(region.roi.value_or(RoiText{}), info.lattice.extent);
   if (!region.region) return box;

@@ -77,8 +77,9 @@ void add_verify(Program& program) {
   CLI::App* app = add_subcommand(program, "verify",
                                  "Read all of a store; check every checksum, range and size.",
                                  "isobrick verify head.zarr");
-  add_path(app, "STORE", arguments->store,
-           "Store to check; levels of more than 2,097,152 chunk files are not looked at");
+  add_path(
+      app, "STORE", arguments->store,
+      "Store to check, also in a zip; levels of more than 2,097,152 chunk files are not looked at");
   add_selection(app, arguments->selection);
   add_memory(app, arguments->memory);
   add_threads(app, arguments->threads);

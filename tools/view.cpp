@@ -198,8 +198,8 @@ int draw(const ViewArguments& arguments, Console& console) {
   if (is_standard_output(arguments.screenshot)) console.reserve_output();
   const OpenedVolume input =
       open_input(arguments.input, arguments.budgets.memory, arguments.budgets.threads, console);
-  const auto store = std::make_shared<const StoreReader>(input.store().info().path,
-                                                         input.store().info().selection);
+  const auto store =
+      std::make_shared<const StoreReader>(input.store().storage(), input.store().info().selection);
   const std::vector<double> isovalues = isovalues_of(arguments, *store, console);
   const std::vector<MeshStyle> styles =
       styles_of(arguments.picture, std::max<std::size_t>(isovalues.size(), 1), "isovalues");
@@ -264,8 +264,9 @@ OpenedVolume open_shown(const ViewArguments& arguments, Console& console) {
   InputArguments input = arguments.input;
   if (is_zarr(input.path))
     input.volume.selection = image_volumes(input.path, input.volume.selection).selection;
-  // The window computes ranges that are missing.
-  return open_input(input, arguments.budgets.memory, arguments.budgets.threads, console, false);
+  // The window computes ranges that are missing, where they can be added.
+  return open_input(input, arguments.budgets.memory, arguments.budgets.threads, console,
+                    !std::filesystem::is_directory(input.path));
 }
 
 int run_view(const ViewArguments& arguments, Console& console) {
@@ -295,9 +296,9 @@ int run_view(const ViewArguments& arguments, Console& console) {
     ViewerWindow window(options);
     if (input) {
       const StoreInfo& info = input->store().info();
+      const std::filesystem::path store = input->store().storage()->local_path();
       window.open(
-          info.path,
-          info.path == arguments.input.path ? arguments.input.volume.selection : info.selection,
+          store, store == arguments.input.path ? arguments.input.volume.selection : info.selection,
           std::filesystem::path(split_volume_path(arguments.input.path).file).filename().string());
     }
     window.run();

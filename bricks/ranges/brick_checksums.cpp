@@ -2,8 +2,9 @@
 
 #include <algorithm>
 #include <cstring>
-#include <memory>
 #include <utility>
+
+#include "bricks/zarr/store_names.h"
 
 namespace isobrick {
 namespace {
@@ -13,8 +14,8 @@ constexpr std::uint64_t kKept = std::uint64_t{1} << 20;
 
 }  // namespace
 
-std::filesystem::path brick_checksum_folder(const std::filesystem::path& store, int level) {
-  return store / "isobrick" / std::to_string(level) / "brick_crc32c";
+std::string brick_checksum_folder(const std::string& additions, int level) {
+  return level_addition(additions, level, "brick_crc32c");
 }
 
 std::uint32_t brick_checksum(const CodecChain& chain, std::span<const std::byte> encoded) {
@@ -31,10 +32,11 @@ std::size_t brick_checksum_bytes(const LevelInfo& level) {
          chunk_bytes(checksum_array_metadata(level.lattice.bricks()));
 }
 
-BrickChecksums::BrickChecksums(const std::filesystem::path& folder, Int3 bricks,
-                               std::uint32_t crc32c)
+BrickChecksums::BrickChecksums(std::shared_ptr<const Storage> storage, std::string folder,
+                               Int3 bricks, std::uint32_t crc32c)
     : bricks_(bricks),
-      array_(folder, bricks, checksum_array_metadata(bricks), crc32c),
+      array_(std::move(storage), std::move(folder), bricks, checksum_array_metadata(bricks),
+             crc32c),
       chunks_(kKept) {}
 
 std::uint32_t BrickChecksums::at(Int3 brick, std::atomic<std::uint64_t>& bytes_read) const {

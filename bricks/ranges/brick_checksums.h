@@ -3,8 +3,9 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
-#include <filesystem>
+#include <memory>
 #include <span>
+#include <string>
 #include <vector>
 
 #include <isobrick/level_info.h>
@@ -17,8 +18,8 @@
 
 namespace isobrick {
 
-/// Where they lie in a store.
-std::filesystem::path brick_checksum_folder(const std::filesystem::path& store, int level);
+/// Where they lie in a store whose ranges lie below `additions`, a key.
+std::string brick_checksum_folder(const std::string& additions, int level);
 
 /// What stands for an absent brick.
 inline constexpr std::uint32_t kAbsentBrick = 0;
@@ -35,7 +36,8 @@ std::size_t brick_checksum_bytes(const LevelInfo& level);
 class BrickChecksums {
  public:
   /// As ItemArrayReader.
-  BrickChecksums(const std::filesystem::path& folder, Int3 bricks, std::uint32_t crc32c);
+  BrickChecksums(std::shared_ptr<const Storage> storage, std::string folder, Int3 bricks,
+                 std::uint32_t crc32c);
 
   bool exists() const { return array_.exists(); }
   /// Throws as ItemArrayReader::read_chunk() does.

@@ -5,6 +5,7 @@
 #include <cstring>
 
 #include <isobrick/error.h>
+#include "bricks/storage/folder_storage.h"
 #include "bricks/zarr/codec.h"
 
 namespace isobrick {
@@ -63,34 +64,32 @@ void IndexChunkWriter::publish() {
   publisher_.publish(std::move(file_), path_);
 }
 
-IndexChunk::IndexChunk(const std::filesystem::path& path, std::size_t parts, bool compressed,
+IndexChunk::IndexChunk(std::shared_ptr<const StoredObject> file, std::size_t parts, bool compressed,
                        const IndexChunkName& name)
-    : file_(open_if_exists(path)), compressed_(compressed), places_(parts) {
-  if (!file_) throw DamageError(fmt::format("'{}' is missing", path.string()));
-  size_ = file_.size();
+    : file_(std::move(file)), compressed_(compressed), size_(file_->size()), places_(parts) {
   const std::uint64_t tail = ShardIndex::encoded_size(parts, true);
   if (size_ < tail)
     throw DamageError(fmt::format("'{}': {} bytes are too few for {} parts of an index",
-                                  path.string(), size_, parts));
+                                  file_->name(), size_, parts));
   std::vector<std::byte> bytes(static_cast<std::size_t>(tail));
-  file_.read_at(size_ - tail, bytes);
+  file_->read(size_ - tail, bytes);
   bytes_read_ += tail;
   try {
     places_ = ShardIndex::decode(bytes, true, size_ - tail, bytes_of(name));
   } catch (const DamageError& e) {
     throw DamageError(
-        fmt::format("'{}': {}; is it a chunk of another place or store?", path.string(), e.what()));
+        fmt::format("'{}': {}; is it a chunk of another place or store?", file_->name(), e.what()));
   }
   // Parts leave no gaps, so their sizes sum up to the file's.
   if (places_.brick_bytes() != size_ - tail)
     throw DamageError(fmt::format("'{}' has {} bytes, but its parts and their places {}",
-                                  path.string(), size_, places_.brick_bytes() + tail));
+                                  file_->name(), size_, places_.brick_bytes() + tail));
 }
 
 void IndexChunk::read_whole() {
   if (size_ > kSmallFile) return;
   std::vector<std::byte> bytes(static_cast<std::size_t>(size_));
-  file_.read_at(0, bytes);
+  file_->read(0, bytes);
   bytes_read_ += size_;
   whole_ = std::move(bytes);
 }
@@ -98,7 +97,9 @@ void IndexChunk::read_whole() {
 bool IndexChunk::is_whole(const std::filesystem::path& path, std::size_t parts,
                           const IndexChunkName& name) {
   try {
-    const IndexChunk chunk(path, parts, false, name);
+    auto file = open_file_object(path);
+    if (!file) return false;
+    const IndexChunk chunk(std::move(file), parts, false, name);
     return true;
   } catch (const DamageError&) {
     return false;
@@ -113,7 +114,7 @@ std::span<const std::byte> IndexChunk::encoded(const ShardIndex::Entry& place,
   if (place.size > kMaxIndexPartBytes + kMaxIndexPartBytes / 8)
     throw DamageError("too long for a part of an index");
   buffer.resize(size);
-  file_.read_at(place.offset, buffer);
+  file_->read(place.offset, buffer);
   bytes_read_ += place.size;
   return buffer;
 }
@@ -136,7 +137,7 @@ bool IndexChunk::read(std::size_t part, std::vector<std::byte>& out) const {
 }
 
 std::string IndexChunk::where(std::size_t part) const {
-  return fmt::format("{} at {} + {}", quoted(path()), places_[part].offset, places_[part].size);
+  return fmt::format("'{}' at {} + {}", file_->name(), places_[part].offset, places_[part].size);
 }
 
 }  // namespace isobrick

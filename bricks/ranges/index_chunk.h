@@ -4,10 +4,12 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <span>
 #include <vector>
 
+#include <isobrick/storage.h>
 #include <isobrick/vec.h>
 #include "bricks/zarr/publisher.h"
 #include "bricks/zarr/shard_index.h"
@@ -61,15 +63,16 @@ class IndexChunkWriter {
 /// Reads one index chunk. Thread-safe after construction.
 class IndexChunk {
  public:
-  /// Reads where the parts are. DamageError when the file is missing, not whole, or another chunk.
-  IndexChunk(const std::filesystem::path& path, std::size_t parts, bool compressed,
+  /// Reads where the parts are. DamageError when the file is not whole, or another chunk.
+  IndexChunk(std::shared_ptr<const StoredObject> file, std::size_t parts, bool compressed,
              const IndexChunkName& name);
 
-  /// Whether the file is there with a checksum and a size that are right.
+  /// Whether the file, if it is there, has a checksum and a size that are right.
   static bool is_whole(const std::filesystem::path& path, std::size_t parts,
                        const IndexChunkName& name);
 
-  const std::filesystem::path& path() const { return file_.path(); }
+  /// How messages name it, without quotes.
+  std::string name() const { return file_->name(); }
   /// Bytes of the file.
   std::uint64_t bytes() const { return size_; }
   /// Bytes read from it so far.
@@ -90,7 +93,7 @@ class IndexChunk {
   std::span<const std::byte> encoded(const ShardIndex::Entry& place,
                                      std::vector<std::byte>& buffer) const;
 
-  File file_;
+  std::shared_ptr<const StoredObject> file_;
   bool compressed_;
   std::uint64_t size_ = 0;
   ShardIndex places_;

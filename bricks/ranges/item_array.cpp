@@ -6,22 +6,20 @@
 #include <utility>
 
 #include <isobrick/error.h>
+#include "bricks/storage/storage_keys.h"
 #include "bricks/zarr/codec.h"
 #include "bricks/zarr/json_reader.h"
-#include "io/bytes/file.h"
 
 namespace isobrick {
 namespace {
 
-std::filesystem::path chunk_path(const std::filesystem::path& folder, const ArrayMetadata& array,
-                                 Int3 c) {
+constexpr const char* kChecksums = "checksums";
+
+/// Below the array's folder.
+std::string chunk_name(const ArrayMetadata& array, Int3 c) {
   std::vector<Index> place{c.z, c.y, c.x};
   place.resize(array.shape.size());
-  return folder / array.chunk_key(place);
-}
-
-std::filesystem::path checksums_file(const std::filesystem::path& folder) {
-  return folder / "checksums";
+  return array.chunk_key(place);
 }
 
 void check_box_within(Box3 box, Int3 items) {
@@ -99,7 +97,7 @@ void ItemArrayWriter::write_chunk(Int3 c, std::span<const std::byte> decoded) {
 void ItemArrayWriter::write_encoded(Int3 c, std::span<const std::byte> encoded) {
   // Each chunk is written once, so that nobody else has this place.
   checksums_[number(c)] = last_checksum(encoded);
-  publisher_.write(chunk_path(folder_, array_, c), encoded);
+  publisher_.write(folder_ / chunk_name(array_, c), encoded);
 }
 
 std::optional<std::uint32_t> ItemArrayWriter::finish() {
@@ -108,22 +106,24 @@ std::optional<std::uint32_t> ItemArrayWriter::finish() {
   if (!chunks_.empty() || complete_count_ != volume(chunk_grid_))
     throw Error(fmt::format("'{}': only some of the items were given", folder_.string()));
   const std::vector<std::uint32_t> all = with_own_checksum(checksums_);
-  publisher_.write(checksums_file(folder_), std::as_bytes(std::span(all)));
+  publisher_.write(folder_ / kChecksums, std::as_bytes(std::span(all)));
   publisher_.write(folder_ / "zarr.json", to_json(array_));
   return all.back();
 }
 
-ItemArrayReader::ItemArrayReader(std::filesystem::path folder, Int3 items, ArrayMetadata array,
-                                 std::uint32_t crc32c)
-    : folder_(std::move(folder)), items_(items), array_(std::move(array)) {
-  const std::filesystem::path file = folder_ / "zarr.json";
-  const auto text = read_small_file(file, kMaxMetadataBytes);
+ItemArrayReader::ItemArrayReader(std::shared_ptr<const Storage> storage, std::string folder,
+                                 Int3 items, ArrayMetadata array, std::uint32_t crc32c)
+    : storage_(std::move(storage)),
+      folder_(std::move(folder)),
+      items_(items),
+      array_(std::move(array)) {
+  const std::string key = join_key(folder_, "zarr.json"), where = quoted(*storage_, key);
+  const auto text = read_small_object(*storage_, key, kMaxMetadataBytes);
   if (!text) {
     exists_ = false;
-    wrong_ = quoted(file) + " is missing";
+    wrong_ = where + " is missing";
     return;
   }
-  const std::string where = quoted(file);
   const ArrayMetadata found = parse_array_metadata(*text, where);
   if (found.shape != array_.shape || found.chunk != array_.chunk || found.type != array_.type ||
       found.sharding)
@@ -134,17 +134,16 @@ ItemArrayReader::ItemArrayReader(std::filesystem::path folder, Int3 items, Array
 
 /// Reading chunks reports what is wrong here: a caller can compute the items anew.
 void ItemArrayReader::read_checksums(std::uint32_t expected) {
-  const std::filesystem::path file = checksums_file(folder_);
+  const std::string key = join_key(folder_, kChecksums);
   const auto count = static_cast<std::size_t>(volume(ceil_div(items_, chunk_extent())));
   const std::size_t bytes = (count + 1) * sizeof(std::uint32_t);
-  const auto text = read_small_file(file, bytes);
+  const auto text = read_small_object(*storage_, key, bytes);
   auto read = text ? parse_range_checksums(std::as_bytes(std::span(*text)), count) : std::nullopt;
   if (!read) {
-    wrong_ = fmt::format("'{}' is {}", file.string(), text ? "damaged" : "missing");
+    wrong_ = fmt::format("{} is {}", quoted(*storage_, key), text ? "damaged" : "missing");
     return;
   }
-  if (read->own != expected)
-    wrong_ = fmt::format("'{}' is that of another level or store", file.string());
+  if (read->own != expected) wrong_ = quoted(*storage_, key) + " is that of another level or store";
   checksums_ = std::move(read->chunks);
 }
 
@@ -154,22 +153,21 @@ std::vector<std::byte> ItemArrayReader::read_chunk(Int3 c,
                                                    std::atomic<std::uint64_t>& bytes_read) const {
   if (!wrong_.empty()) throw DamageError(wrong_);
   const std::size_t size = chunk_bytes(array_);
-  const std::filesystem::path path = chunk_path(folder_, array_, c);
-  const auto content = read_small_file(path, 2 * size + 1024);
+  const std::string key = join_key(folder_, chunk_name(array_, c));
+  const auto content = read_small_object(*storage_, key, 2 * size + 1024);
   // Chunks are written even where all items are alike, so none may be missing.
-  if (!content) throw DamageError(fmt::format("'{}' is missing", path.string()));
+  if (!content) throw DamageError(quoted(*storage_, key) + " is missing");
   const auto encoded = std::as_bytes(std::span(*content));
   bytes_read += encoded.size();
   std::vector<std::byte> decoded(size);
   try {
     decode_bytes(array_.codecs, size_of(array_.type), encoded, decoded);
   } catch (const DamageError& e) {
-    throw DamageError(fmt::format("'{}': {}", path.string(), e.what()));
+    throw DamageError(fmt::format("{}: {}", quoted(*storage_, key), e.what()));
   }
   const Int3 grid = ceil_div(items_, chunk_extent());
   if (last_checksum(encoded) != checksums_[static_cast<std::size_t>(linear_index(c, grid))])
-    throw DamageError(
-        fmt::format("'{}' is the chunk of another place, level or store", path.string()));
+    throw DamageError(quoted(*storage_, key) + " is the chunk of another place, level or store");
   return decoded;
 }
 

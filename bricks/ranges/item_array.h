@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <map>
+#include <memory>
 #include <mutex>
 #include <optional>
 #include <span>
@@ -12,6 +13,7 @@
 #include <tuple>
 #include <vector>
 
+#include <isobrick/storage.h>
 #include "bricks/ranges/range_format.h"
 #include "bricks/zarr/array_metadata.h"
 #include "bricks/zarr/publisher.h"
@@ -59,14 +61,15 @@ class ItemArrayWriter {
 /// Reads such an array. Thread-safe.
 class ItemArrayReader {
  public:
-  /// Throws DamageError when the array is not `array`. `crc32c` is what ItemArrayWriter::finish()
-  /// returned.
-  ItemArrayReader(std::filesystem::path folder, Int3 items, ArrayMetadata array,
-                  std::uint32_t crc32c);
+  /// Throws DamageError when the array is not `array`. `folder` is a key, `crc32c` what
+  /// ItemArrayWriter::finish() returned.
+  ItemArrayReader(std::shared_ptr<const Storage> storage, std::string folder, Int3 items,
+                  ArrayMetadata array, std::uint32_t crc32c);
 
   /// Whether the array is there, damaged or not.
   bool exists() const { return exists_; }
-  const std::filesystem::path& folder() const { return folder_; }
+  /// How messages name the array.
+  std::string name() const { return storage_->name_of(folder_); }
   /// Throws UsageError for a box that is empty or goes beyond the array.
   void check_box(Box3 box) const;
   /// Items of a chunk.
@@ -78,7 +81,8 @@ class ItemArrayReader {
  private:
   void read_checksums(std::uint32_t crc32c);
 
-  std::filesystem::path folder_;
+  std::shared_ptr<const Storage> storage_;
+  std::string folder_;
   Int3 items_;
   ArrayMetadata array_;
   std::vector<std::uint32_t> checksums_;  ///< of all chunks, C order [z, y, x]

@@ -6,6 +6,7 @@
 
 #include <isobrick/error.h>
 #include "bricks/ranges/range_format.h"
+#include "bricks/zarr/store_names.h"
 
 namespace isobrick {
 namespace {
@@ -17,19 +18,20 @@ constexpr std::uint64_t kKept = std::uint64_t{1} << 20;
 
 }  // namespace
 
-std::filesystem::path brick_range_folder(const std::filesystem::path& store, int level) {
-  return store / "isobrick" / std::to_string(level) / "range";
+std::string brick_range_folder(const std::string& additions, int level) {
+  return level_addition(additions, level, "range");
 }
 
-std::filesystem::path block_range_folder(const std::filesystem::path& store, int level) {
-  return store / "isobrick" / std::to_string(level) / "block_range";
+std::string block_range_folder(const std::string& additions, int level) {
+  return level_addition(additions, level, "block_range");
 }
 
-RangeArrayReader::RangeArrayReader(std::filesystem::path folder, Int3 items, ScalarType type,
-                                   std::uint32_t crc32c)
+RangeArrayReader::RangeArrayReader(std::shared_ptr<const Storage> storage, std::string folder,
+                                   Int3 items, ScalarType type, std::uint32_t crc32c)
     : type_(type),
       chunk_grid_(ceil_div(items, range_chunk_extent(items))),
-      array_(std::move(folder), items, range_array_metadata(items, type), crc32c),
+      array_(std::move(storage), std::move(folder), items, range_array_metadata(items, type),
+             crc32c),
       chunks_(kKept) {}
 
 std::shared_ptr<const RangeArrayReader::Chunk> RangeArrayReader::chunk(
@@ -46,8 +48,8 @@ std::shared_ptr<const RangeArrayReader::Chunk> RangeArrayReader::chunk(
 RangeTable RangeArrayReader::read(Box3 box, std::atomic<std::uint64_t>& bytes_read) const {
   array_.check_box(box);
   if (volume(box.extent()) > kMaxItemsAtOnce)
-    throw Error(fmt::format("'{}': {} ranges are too many at once", array_.folder().string(),
-                            volume(box.extent())));
+    throw Error(
+        fmt::format("'{}': {} ranges are too many at once", array_.name(), volume(box.extent())));
   RangeTable table{box, {}};
   table.ranges.resize(static_cast<std::size_t>(volume(box.extent())));
   std::atomic<std::uint64_t> bytes = 0;

@@ -3,8 +3,8 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
-#include <filesystem>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include <isobrick/range_table.h>
@@ -13,15 +13,16 @@
 
 namespace isobrick {
 
-/// Where the ranges of bricks and of blocks lie in a store.
-std::filesystem::path brick_range_folder(const std::filesystem::path& store, int level);
-std::filesystem::path block_range_folder(const std::filesystem::path& store, int level);
+/// Where the ranges of bricks and of blocks lie in a store, below `additions`: all are keys.
+std::string brick_range_folder(const std::string& additions, int level);
+std::string block_range_folder(const std::string& additions, int level);
 
 /// Reads an array of ranges.
 class RangeArrayReader {
  public:
   /// As ItemArrayReader.
-  RangeArrayReader(std::filesystem::path folder, Int3 items, ScalarType type, std::uint32_t crc32c);
+  RangeArrayReader(std::shared_ptr<const Storage> storage, std::string folder, Int3 items,
+                   ScalarType type, std::uint32_t crc32c);
 
   bool exists() const { return array_.exists(); }
   /// Throws as ItemArrayReader::read_chunk() does.

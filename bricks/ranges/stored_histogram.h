@@ -2,8 +2,10 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <string>
 #include <vector>
 
+#include <isobrick/storage.h>
 #include <isobrick/vec.h>
 #include "bricks/zarr/publisher.h"
 
@@ -43,15 +45,16 @@ struct StoredHistogram {
   friend bool operator==(const StoredHistogram&, const StoredHistogram&) = default;
 };
 
-/// Where the counts lie in a store.
-std::filesystem::path histogram_folder(const std::filesystem::path& store);
+/// Where the counts lie in a store, below `additions`: both are keys.
+std::string histogram_folder(const std::string& additions);
 
 /// Writes the array of the counts.
 StoredHistogram write_histogram(const std::filesystem::path& folder, const SampleCounts& counts,
                                 Publisher& publisher);
 
-/// Reads it. Throws DamageError for another array, and unless there are `samples` counts in all.
-SampleCounts read_histogram(const std::filesystem::path& folder, const StoredHistogram& stored,
-                            std::uint64_t samples);
+/// Reads it from `folder`, a key. Throws DamageError for another array, and unless there are
+/// `samples` counts in all.
+SampleCounts read_histogram(const Storage& storage, const std::string& folder,
+                            const StoredHistogram& stored, std::uint64_t samples);
 
 }  // namespace isobrick

@@ -1,8 +1,8 @@
 #include "bricks/ranges/stored_ranges.h"
 
 #include "bricks/ranges/checksummed_json.h"
+#include "bricks/storage/storage_keys.h"
 #include "bricks/zarr/json_reader.h"
-#include "io/bytes/file.h"
 
 namespace isobrick {
 namespace {
@@ -40,8 +40,8 @@ StoredHistogram parse_histogram(const JsonReader& json) {
 
 }  // namespace
 
-std::filesystem::path ranges_file(const std::filesystem::path& store) {
-  return store / "isobrick" / "ranges.json";
+std::string ranges_file(const std::string& additions) {
+  return join_key(additions, "isobrick/ranges.json");
 }
 
 std::string to_json(const StoredRanges& stored) {
@@ -80,11 +80,12 @@ StoredRanges parse_stored_ranges(std::string_view text, const std::string& where
   return stored;
 }
 
-std::optional<StoredRanges> read_stored_ranges(const std::filesystem::path& store) {
-  const std::filesystem::path file = ranges_file(store);
-  const auto text = read_small_file(file, kMaxMetadataBytes);
+std::optional<StoredRanges> read_stored_ranges(const Storage& storage,
+                                               const std::string& additions) {
+  const std::string key = ranges_file(additions);
+  const auto text = read_small_object(storage, key, kMaxMetadataBytes);
   if (!text) return std::nullopt;
-  return parse_stored_ranges(*text, quoted(file));
+  return parse_stored_ranges(*text, quoted(storage, key));
 }
 
 }  // namespace isobrick

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstdint>
-#include <filesystem>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -31,7 +30,8 @@ struct StoredRanges {
   friend bool operator==(const StoredRanges&, const StoredRanges&) = default;
 };
 
-std::filesystem::path ranges_file(const std::filesystem::path& store);
+/// Where it lies in a store, below `additions`: both are keys.
+std::string ranges_file(const std::string& additions);
 
 /// The text of ranges.json.
 std::string to_json(const StoredRanges& stored);
@@ -40,7 +40,8 @@ std::string to_json(const StoredRanges& stored);
 /// a version that this program does not know.
 StoredRanges parse_stored_ranges(std::string_view text, const std::string& where);
 
-/// The ranges.json of a store; nullopt when there is none. Throws as parse_stored_ranges() does.
-std::optional<StoredRanges> read_stored_ranges(const std::filesystem::path& store);
+/// Reads it; nullopt when there is none. Throws as parse_stored_ranges() does.
+std::optional<StoredRanges> read_stored_ranges(const Storage& storage,
+                                               const std::string& additions);
 
 }  // namespace isobrick

@@ -2,14 +2,16 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <optional>
 
 #include <isobrick/error.h>
+#include "bricks/storage/open_storage.h"
+#include "bricks/storage/storage_keys.h"
 #include "bricks/zarr/json_reader.h"
 #include "bricks/zarr/lone_array.h"
 #include "bricks/zarr/store_names.h"
 #include "bricks/zarr/zarr_v2.h"
-#include "io/bytes/file.h"
 
 namespace isobrick {
 namespace {
@@ -18,56 +20,56 @@ namespace fs = std::filesystem;
 
 /// Metadata in the words of Zarr version 3, and where it came from.
 struct Text {
-  fs::path file;
+  std::string key;
   std::string json;
 };
 
-std::optional<std::string> read_text(const fs::path& file) {
-  return read_small_file(file, kMaxMetadataBytes);
+std::optional<std::string> read_text(const Storage& storage, const std::string& key) {
+  return read_small_object(storage, key, kMaxMetadataBytes);
 }
 
-std::optional<Text> read_array(const fs::path& folder) {
-  if (auto text = read_text(folder / "zarr.json"))
-    return Text{folder / "zarr.json", std::move(*text)};
-  const fs::path file = folder / ".zarray", attributes = folder / ".zattrs";
-  const auto text = read_text(file);
+std::optional<Text> read_array(const Storage& storage, const std::string& folder) {
+  const std::string v3 = join_key(folder, "zarr.json");
+  if (auto text = read_text(storage, v3)) return Text{v3, std::move(*text)};
+  const std::string v2 = join_key(folder, ".zarray"), attributes = join_key(folder, ".zattrs");
+  const auto text = read_text(storage, v2);
   if (!text) return std::nullopt;
-  Text array{file, v3_from_zarray(*text, quoted(file))};
-  if (const auto names = read_text(attributes))
-    array.json = with_dimension_names(array.json, *names, quoted(attributes));
+  Text array{v2, v3_from_zarray(*text, quoted(storage, v2))};
+  if (const auto names = read_text(storage, attributes))
+    array.json = with_dimension_names(array.json, *names, quoted(storage, attributes));
   return array;
 }
 
 /// A group in the words of version 3, or that of an array alone.
-Text read_root(const fs::path& path) {
-  const auto v3 = read_text(path / "zarr.json");
+Text read_root(const Storage& storage) {
+  const auto v3 = read_text(storage, "zarr.json");
   if (v3) {
-    const nlohmann::json parsed = parse_json(*v3, quoted(path / "zarr.json"));
-    if (parsed.value("node_type", nlohmann::json()) != "array") return {path / "zarr.json", *v3};
-  } else if (const auto attributes = read_text(path / ".zattrs")) {
-    const fs::path file = path / ".zattrs";
-    if (std::string group = v3_from_zattrs(*attributes, quoted(file)); !group.empty())
-      return {file, std::move(group)};
+    const nlohmann::json parsed = parse_json(*v3, quoted(storage, "zarr.json"));
+    if (parsed.value("node_type", nlohmann::json()) != "array") return {"zarr.json", *v3};
+  } else if (const auto attributes = read_text(storage, ".zattrs")) {
+    if (std::string group = v3_from_zattrs(*attributes, quoted(storage, ".zattrs")); !group.empty())
+      return {".zattrs", std::move(group)};
   }
-  if (!v3 && fs::exists(path / kLayoutMarker))
+  if (!v3 && storage.open(kLayoutMarker))
     throw Error(fmt::format("'{}' is unfinished: its conversion was interrupted; resume it",
-                            path.string()));
-  if (const auto array = read_array(path))
-    return {array->file,
-            group_of(parse_array_metadata(array->json, quoted(array->file)), quoted(array->file))};
-  if (fs::exists(path / ".zgroup"))
+                            storage.name()));
+  if (const auto array = read_array(storage, "")) {
+    const std::string where = quoted(storage, array->key);
+    return {array->key, group_of(parse_array_metadata(array->json, where), where)};
+  }
+  if (storage.open(".zgroup"))
     throw Error(fmt::format(
         "'{}' is a group of Zarr version 2 without OME-NGFF multiscales: no image; name an image "
-        "or an array in it, such as '{}'",
-        path.string(), (path / "0").string()));
-  throw Error(fmt::format("'{}' is no store: it has no zarr.json", path.string()));
+        "or an array in it, such as {}",
+        storage.name(), quoted(storage, "0")));
+  throw Error(fmt::format("'{}' is no store: it has no zarr.json", storage.name()));
 }
 
 // Our metadata has a checksum; that of others has only its syntax.
-void check_ours(const MetadataFiles& files, const fs::path& path) {
-  const std::string where = quoted(files.root);
+void check_ours(const MetadataFiles& files, const Storage& storage) {
+  const std::string where = quoted(storage, files.root);
   if (!files.image.ours) {
-    if (fs::exists(path / "isobrick" / "zarr.json"))
+    if (storage.open("isobrick/zarr.json"))
       throw DamageError(where + ": metadata was changed: attributes.isobrick is missing");
     return;
   }
@@ -84,34 +86,33 @@ void check_ours(const MetadataFiles& files, const fs::path& path) {
 
 }  // namespace
 
-MetadataFiles read_metadata_files(const fs::path& path) {
-  if (!fs::is_directory(path))
-    throw Error(fmt::format("'{}' is no store: not a directory", path.string()));
-  const Text root = read_root(path);
+MetadataFiles read_metadata_files(const Storage& storage) {
+  const Text root = read_root(storage);
+  const std::string root_name = quoted(storage, root.key);
   MetadataFiles files;
-  files.root = root.file;
-  files.image = parse_image_metadata(root.json, quoted(root.file));
+  files.root = root.key;
+  files.image = parse_image_metadata(root.json, root_name);
   std::vector<std::string> texts;
   for (const ImageMetadata::Level& level : files.image.levels) {
-    const fs::path folder = path / level.path;
-    auto text = read_array(folder);
-    if (!text) throw DamageError(quoted(folder / "zarr.json") + " is missing");
-    files.levels.push_back({folder, text->file, {}});
+    const std::string folder = join_key(level.path, "");
+    auto text = read_array(storage, folder);
+    if (!text) throw DamageError(quoted(storage, join_key(folder, "zarr.json")) + " is missing");
+    files.levels.push_back({folder, text->key, {}});
     texts.push_back(std::move(text->json));
   }
-  files.crc32c = metadata_checksum(root.json, texts, quoted(root.file));
-  check_ours(files, path);
+  files.crc32c = metadata_checksum(root.json, texts, root_name);
+  check_ours(files, storage);
   for (std::size_t i = 0; i < texts.size(); ++i) {
-    files.levels[i].array = parse_array_metadata(texts[i], quoted(files.levels[i].file));
-    check_axis_order(files.levels[i].array, quoted(files.levels[i].file));
+    const std::string where = quoted(storage, files.levels[i].file);
+    files.levels[i].array = parse_array_metadata(texts[i], where);
+    check_axis_order(files.levels[i].array, where);
   }
   return files;
 }
 
 bool is_zarr(const fs::path& path) {
-  for (const char* name : {"zarr.json", ".zattrs", ".zgroup", ".zarray"})
-    if (fs::exists(path / name)) return true;
-  return false;
+  if (is_zip(path)) return true;
+  return std::ranges::any_of(kZarrFiles, [&](const char* name) { return fs::exists(path / name); });
 }
 
 }  // namespace isobrick

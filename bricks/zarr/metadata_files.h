@@ -6,6 +6,7 @@
 #include <vector>
 
 #include <isobrick/image_metadata.h>
+#include <isobrick/storage.h>
 #include "bricks/zarr/array_metadata.h"
 
 namespace isobrick {
@@ -15,20 +16,20 @@ namespace isobrick {
 /// with samples at 0, 1, 2, …
 struct MetadataFiles {
   struct Level {
-    std::filesystem::path folder, file;
+    std::string folder, file;  ///< keys
     ArrayMetadata array;
   };
   ImageMetadata image;
   std::vector<Level> levels;
-  std::filesystem::path root;  ///< the file that `image` was read from
-  std::uint32_t crc32c = 0;    ///< metadata_checksum()
+  std::string root;          ///< key of the object that `image` was read from
+  std::uint32_t crc32c = 0;  ///< metadata_checksum()
 };
 
-/// Throws Error when `path` is no such image or something is not supported,
+/// Throws Error when `storage` has no such image or something is not supported,
 /// DamageError when a file is broken or missing.
-MetadataFiles read_metadata_files(const std::filesystem::path& path);
+MetadataFiles read_metadata_files(const Storage& storage);
 
-/// Whether a folder looks like Zarr of any version.
+/// Whether a folder looks like Zarr of any version, or a file is a zip, in which it may lie.
 bool is_zarr(const std::filesystem::path& path);
 
 }  // namespace isobrick

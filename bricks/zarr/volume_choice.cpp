@@ -61,10 +61,10 @@ std::vector<VolumeAxis> open_axes(const ImageMetadata& image, const ArrayMetadat
   return chosen < axes.size() ? axes : std::vector<VolumeAxis>();
 }
 
-VolumeChoice choose_volume(const std::filesystem::path& path, const ImageMetadata& image,
+VolumeChoice choose_volume(const std::string& image_name, const ImageMetadata& image,
                            const ArrayMetadata& array, const Selection& selection) {
   if (array.shape.size() != image.leading.size() + 3)
-    throw Error(fmt::format("'{}': arrays of {} dimensions do not fit axes of {}", path.string(),
+    throw Error(fmt::format("'{}': arrays of {} dimensions do not fit axes of {}", image_name,
                             array.shape.size(), image.leading.size() + 3));
   VolumeChoice choice;
   std::string name;
@@ -76,21 +76,21 @@ VolumeChoice choose_volume(const std::filesystem::path& path, const ImageMetadat
     Role role = axis.role;
     if (role == Role::unknown && count > 1) {
       role = free.chosen(selection);
-      if (role == Role::unknown) refuse_axis(path.string(), axis.name, count, free);
+      if (role == Role::unknown) refuse_axis(image_name, axis.name, count, free);
     }
     if ((role == Role::time && times) || (role == Role::channel && channels))
-      throw Error(fmt::format("'{}' has several axes of {}, which is not supported", path.string(),
+      throw Error(fmt::format("'{}' has several axes of {}, which is not supported", image_name,
                               role == Role::time ? "time" : "channels"));
     times |= role == Role::time;
     channels |= role == Role::channel;
-    choice.place.push_back(choose_on_axis(path.string(), count, role, selection));
+    choice.place.push_back(choose_on_axis(image_name, count, role, selection));
     if (count > 1)
       name += fmt::format("{}{}_{}", name.empty() ? "" : "_",
                           role == Role::time ? "time" : "channel", choice.place.back());
   }
-  if (!times) choose(path.string(), "--time", 1, selection.time);
-  if (!channels) choose(path.string(), "--channel", 1, selection.channel);
-  if (!name.empty()) choice.folder = std::filesystem::path("isobrick") / name;
+  if (!times) choose(image_name, "--time", 1, selection.time);
+  if (!channels) choose(image_name, "--channel", 1, selection.channel);
+  if (!name.empty()) choice.folder = "isobrick/" + name;
   return choice;
 }
 

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstdint>
-#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -13,8 +12,8 @@ namespace isobrick {
 
 /// Which volume of an image with channels and times is read.
 struct VolumeChoice {
-  std::vector<Index> place;      ///< on the axes before z, y, x
-  std::filesystem::path folder;  ///< of its ranges; empty when the image has one volume
+  std::vector<Index> place;  ///< on the axes before z, y, x
+  std::string folder;        ///< of its ranges, a key; empty when the image has one volume
 };
 
 /// An axis along which an image has several volumes.
@@ -29,8 +28,9 @@ std::vector<VolumeAxis> open_axes(const ImageMetadata& image, const ArrayMetadat
                                   const Selection& selection);
 
 /// Throws UsageError when there are several volumes and the selection does not
-/// name one, or names one that is not there. `array` is that of a level.
-VolumeChoice choose_volume(const std::filesystem::path& path, const ImageMetadata& image,
+/// name one, or names one that is not there. `image_name` is for messages; `array` is that
+/// of a level.
+VolumeChoice choose_volume(const std::string& image_name, const ImageMetadata& image,
                            const ArrayMetadata& array, const Selection& selection);
 
 /// Where a volume's samples are among those of others in chunks and shards.

@@ -12,15 +12,16 @@
 #include <isobrick/level_info.h>
 #include <isobrick/range_table.h>
 #include <isobrick/selection.h>
+#include <isobrick/storage.h>
 
 namespace isobrick {
 
 /// A store's metadata.
 struct StoreInfo {
-  std::filesystem::path path;  ///< of the store's folder
-  /// What ranges and indices are found under: `path`, or a folder in it that
-  /// belongs to one of several channels or times.
-  std::filesystem::path additions;
+  std::string name;  ///< how messages name the store: that of its storage
+  /// The key that ranges and indices are found below: empty, or that of a folder that belongs to
+  /// one of several channels or times.
+  std::string additions;
   Selection selection;               ///< as requested
   std::vector<LevelInfo> levels;     ///< the finest first
   ScalarType type = ScalarType::u8;  ///< of the samples
@@ -40,11 +41,11 @@ std::string index_command(const StoreInfo& info);
 /// The most that any level's decode_extra takes for so many threads.
 std::uint64_t decode_extra(const StoreInfo& info, int threads);
 
-/// Where a brick lies on disk.
+/// Where a brick lies in the storage of its store.
 struct BrickLocation {
-  std::filesystem::path file;  ///< the shard or chunk file
-  std::uint64_t offset = 0;    ///< of the encoded brick in the file, bytes
-  std::uint64_t size = 0;      ///< of the encoded brick, bytes
+  std::string key;           ///< of the shard or chunk
+  std::uint64_t offset = 0;  ///< of the encoded brick in that object, bytes
+  std::uint64_t size = 0;    ///< of the encoded brick, bytes
 };
 
 /// What reading bricks has cost so far, summed over threads.
@@ -67,14 +68,18 @@ struct BrickTimes {
 /// in bounded memory, never samples.
 class StoreReader {
  public:
-  /// Throws Error when `path` is no store, is one of an unknown version, or
+  /// Opens the store in a folder or in a zip, as open_storage() does.
+  explicit StoreReader(const std::filesystem::path& path, const Selection& selection = {});
+  /// Throws Error when there is no store, one of an unknown version, or one that
   /// lacks what is needed; DamageError when its metadata is broken; UsageError
   /// when the selection leaves open which volume is meant, or means none.
-  explicit StoreReader(const std::filesystem::path& path, const Selection& selection = {});
+  explicit StoreReader(std::shared_ptr<const Storage> storage, const Selection& selection = {});
   ~StoreReader();
 
   /// The metadata. Valid as long as the reader.
   const StoreInfo& info() const;
+  /// Where the store is read from.
+  const std::shared_ptr<const Storage>& storage() const;
 
   /// Where brick `b` is, or nothing when it is absent (all fill value).
   std::optional<BrickLocation> locate(int level, Int3 b) const;
@@ -88,10 +93,10 @@ class StoreReader {
   /// checksum; nullopt when it is absent.
   std::optional<std::uint32_t> read_brick_unchecked(int level, Int3 b, std::byte* out) const;
 
-  /// Hints that brick `b` is read soon; may start the disk.
+  /// Hints that brick `b` is read soon, as StoredObject::will_need().
   void will_need(int level, Int3 b) const;
 
-  /// Bytes read from disk so far (bricks, indices, ranges).
+  /// Bytes read from the storage so far (bricks, indices, ranges).
   std::uint64_t bytes_read() const;
   /// The bricks among it.
   BrickTimes brick_times() const;

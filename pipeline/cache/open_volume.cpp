@@ -104,7 +104,8 @@ std::string text_of(const VolumeRequest& r) {
 /// What a store is made of.
 std::string key_of(const std::string& path, const VolumeInfo& info, const VolumeRequest& request) {
   std::string key = fmt::format("{}\n{}", kKeyVersion, text_of(request));
-  if (is_zarr(path)) return key + identity_of(path) + identity_of_folder(path);
+  if (fs::is_directory(path) && is_zarr(path))
+    return key + identity_of(path) + identity_of_folder(path);
   for (const fs::path& file : info.files) key += identity_of(file);
   return key;
 }
@@ -208,7 +209,7 @@ struct OpenedVolume::Impl {
   void convert_to(const fs::path& out, const std::string& place, const std::string& path,
                   VolumeSource& source, const OpenOptions& options, Progress& progress) {
     add_note(options, fmt::format("converting '{}' into {}", path, place));
-    if (is_zarr(path) && takes_all(options.volume))
+    if (fs::is_directory(path) && is_zarr(path) && takes_all(options.volume))
       add_note(options, fmt::format("without that copy: '{}' adds what it lacks in place",
                                     "isobrick index " + shell_word(path)));
     std::error_code none;

@@ -37,8 +37,8 @@ constexpr std::size_t kPieceBytes = 256 * kMiB;
 Box3 region(const StoreReader& store, int level, const std::optional<Box3>& roi) {
   const StoreInfo& info = store.info();
   if (level < 0 || level >= static_cast<int>(info.levels.size()))
-    throw UsageError(fmt::format("there is no level {}: '{}' has {}", level, info.path.string(),
-                                 info.levels.size()));
+    throw UsageError(
+        fmt::format("there is no level {}: '{}' has {}", level, info.name, info.levels.size()));
   const Box3 all = info.levels[static_cast<std::size_t>(level)].lattice.box();
   if (!roi) return all;
   if (roi->empty() || intersect(*roi, all) != *roi)
@@ -275,7 +275,8 @@ void export_volume(const StoreReader& store, const std::filesystem::path& out,
   const Box3 box = region(store, options.level, options.roi);
   const LevelInfo& level = store.info().levels[static_cast<std::size_t>(options.level)];
   VolumeInfo info = describe(level, box, out.string());
-  check_replaces_no_input(out, {&store.info().path, 1});
+  const std::filesystem::path input = store.storage()->local_path();
+  if (!input.empty()) check_replaces_no_input(out, {&input, 1});
   bool left = !streamed && remove_leftovers(out.string());
   if (!streamed && options.format == ExportFormat::raw)
     left |= remove_leftovers(DetachedHeader::name_of(out));

@@ -8,7 +8,6 @@
 
 #include <isobrick/error.h>
 #include "bricks/level_set.h"
-#include "io/bytes/file.h"
 #include "pipeline/extract/gpu_backend.h"
 #include "pipeline/extract/mesh_header.h"
 #include "pipeline/extract/resolve_index.h"
@@ -108,12 +107,12 @@ ExtractRequest check_request(const StoreReader& store, const ExtractOptions& opt
   const auto levels = static_cast<int>(info.levels.size());
   if (options.level < 0 || options.level >= levels)
     throw UsageError(fmt::format("level {} does not exist: '{}' has levels 0 to {}", options.level,
-                                 info.path.string(), levels - 1));
+                                 info.name, levels - 1));
   if (std::isnan(options.isovalue)) throw UsageError("the isovalue is not a number");
   ExtractRequest request;
   request.level = &info.levels[static_cast<std::size_t>(options.level)];
   const Lattice& lattice = request.level->lattice;
-  check_coordinates(request.level->transform, lattice.extent, quoted(info.path));
+  check_coordinates(request.level->transform, lattice.extent, "'" + info.name + "'");
   const Box3 roi = options.roi.value_or(lattice.box());
   check_roi(roi, lattice.extent);
   request.surface = {.isovalue = options.isovalue,

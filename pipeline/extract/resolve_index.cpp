@@ -16,7 +16,7 @@ SearchMethod fastest(const StoreReader& store, int level) {
   for (const IndexKind kind :
        {IndexKind::octree, IndexKind::kdtree, IndexKind::interval, IndexKind::quadtree}) {
     const std::string name(name_of(kind));
-    if (has_index(store.info().additions, level, name) &&
+    if (has_index(store, level, name) &&
         StoredIndex(store, level, name).layout().leaf == kBlockEdge)
       return {.kind = kind, .only_if_few = true};
   }
@@ -29,10 +29,9 @@ SearchMethod resolve_index(const StoreReader& store, int level, const IndexChoic
   if (choice.automatic) return fastest(store, level);
   if (!choice.kind) return {};
   const std::string kind(name_of(*choice.kind));
-  if (!has_index(store.info().additions, level, kind))
+  if (!has_index(store, level, kind))
     throw UsageError(fmt::format("level {} of '{}' has no {} index; run: {} --kind {}", level,
-                                 store.info().path.string(), kind, index_command(store.info()),
-                                 kind));
+                                 store.info().name, kind, index_command(store.info()), kind));
   return {.kind = choice.kind, .only_if_few = false};
 }
 

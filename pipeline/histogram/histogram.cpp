@@ -90,10 +90,10 @@ std::string why_no_histogram(const StoreReader& store, std::uint64_t memory) {
 
 std::optional<SampleCounts> stored_counts(const StoreReader& store) {
   const StoreInfo& info = store.info();
-  const auto ranges = read_stored_ranges(info.additions);
+  const auto ranges = read_stored_ranges(*store.storage(), info.additions);
   if (!ranges || !ranges->histogram || ranges->image_crc32c != info.metadata_crc32c)
     return std::nullopt;
-  return read_histogram(histogram_folder(info.additions), *ranges->histogram,
+  return read_histogram(*store.storage(), histogram_folder(info.additions), *ranges->histogram,
                         static_cast<std::uint64_t>(volume(info.levels.front().lattice.extent)));
 }
 

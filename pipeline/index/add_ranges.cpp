@@ -11,6 +11,7 @@
 #include "bricks/ranges/item_array.h"
 #include "bricks/ranges/range_array.h"
 #include "bricks/ranges/stored_ranges.h"
+#include "bricks/storage/open_storage.h"
 #include "bricks/store_entries.h"
 #include "io/bytes/exchange.h"
 #include "io/bytes/output_folder.h"
@@ -30,22 +31,29 @@ fs::path partial(fs::path folder) {
   return folder;
 }
 
+/// Below which folder ranges are added to a store.
+fs::path additions_of(const StoreReader& store) {
+  return store.storage()->local_path() / store.info().additions;
+}
+
 /// Calls f(folder, where it lies in a store) for the arrays of ranges and checksums of every level
 /// and for the histogram.
 template <class F>
-void for_each_added_folder(const StoreInfo& info, F&& f) {
-  for (int level = 0; level < static_cast<int>(info.levels.size()); ++level) {
-    f(block_range_folder(info.additions, level), block_range_folder("", level));
-    f(brick_range_folder(info.additions, level), brick_range_folder("", level));
-    f(brick_checksum_folder(info.additions, level), brick_checksum_folder("", level));
+void for_each_added_folder(const StoreReader& store, F&& f) {
+  const fs::path root = additions_of(store);
+  const auto call = [&](const std::string& place) { f(root / place, fs::path(place)); };
+  for (int level = 0; level < static_cast<int>(store.info().levels.size()); ++level) {
+    call(block_range_folder("", level));
+    call(brick_range_folder("", level));
+    call(brick_checksum_folder("", level));
   }
-  f(histogram_folder(info.additions), histogram_folder(""));
+  call(histogram_folder(""));
 }
 
 /// Removes what was written beside the places of ranges.
-void discard_unfinished(const StoreInfo& info) {
-  const OutputFolder root(info.path);
-  for_each_added_folder(info, [&](const fs::path& folder, const fs::path&) {
+void discard_unfinished(const StoreReader& store) {
+  const OutputFolder root(store.storage()->local_path());
+  for_each_added_folder(store, [&](const fs::path& folder, const fs::path&) {
     std::error_code none;
     if (fs::exists(fs::symlink_status(partial(folder), none))) root.remove_folder(partial(folder));
   });
@@ -77,13 +85,13 @@ std::uint64_t piece_bytes(const LevelInfo& level, std::uint64_t memory, std::uin
 void write_ranges(const StoreReader& store, int level, std::uint64_t bytes, Publisher& publisher,
                   Progress& progress, StoredRanges& stored) {
   const Lattice& lattice = store.info().levels[static_cast<std::size_t>(level)].lattice;
-  const fs::path& root = store.info().additions;
+  const fs::path root = additions_of(store);
   const Int3 block_count = lattice.blocks(), brick_count = lattice.bricks();
-  ItemArrayWriter blocks(partial(block_range_folder(root, level)), block_count,
+  ItemArrayWriter blocks(partial(root / block_range_folder("", level)), block_count,
                          range_array_metadata(block_count, lattice.type), publisher);
-  ItemArrayWriter bricks(partial(brick_range_folder(root, level)), brick_count,
+  ItemArrayWriter bricks(partial(root / brick_range_folder("", level)), brick_count,
                          range_array_metadata(brick_count, lattice.type), publisher);
-  ItemArrayWriter checksums(partial(brick_checksum_folder(root, level)), brick_count,
+  ItemArrayWriter checksums(partial(root / brick_checksum_folder("", level)), brick_count,
                             checksum_array_metadata(brick_count), publisher);
   const auto ranges = make_level_ranges(lattice);
   const auto counts = level == 0 ? make_value_counts(lattice.type) : nullptr;
@@ -101,7 +109,7 @@ void write_ranges(const StoreReader& store, int level, std::uint64_t bytes, Publ
   stored.may_have_nan |= ranges->has_nan();
   if (counts)
     stored.histogram =
-        write_histogram(partial(histogram_folder(root)), counts->counts(), publisher);
+        write_histogram(partial(root / histogram_folder("")), counts->counts(), publisher);
 }
 
 }  // namespace
@@ -116,9 +124,9 @@ void add_ranges(const StoreReader& store, std::uint64_t memory, int threads, Pro
     total +=
         static_cast<std::uint64_t>(volume(level.lattice.extent)) * level.lattice.sample_bytes();
   }
-  Publisher publisher(info.path);
+  Publisher publisher(store.storage()->local_path());
   const StoreEntries entries = StoreEntries::of(info.levels);
-  for_each_added_folder(info, [&](const fs::path& folder, const fs::path& place) {
+  for_each_added_folder(store, [&](const fs::path& folder, const fs::path& place) {
     check_replaceable(folder, entries, place);
     check_replaceable(partial(folder), entries, place);
     publisher.folder().remove_folder(partial(folder));  // of a run that was interrupted
@@ -131,16 +139,19 @@ void add_ranges(const StoreReader& store, std::uint64_t memory, int threads, Pro
                  publisher, progress, stored);
   publisher.wait();
   progress.end();
-  for_each_added_folder(info, [&](const fs::path& folder, const fs::path& place) {
+  for_each_added_folder(store, [&](const fs::path& folder, const fs::path& place) {
     publisher.folder().replace_folder(partial(folder), folder);
     check_replaceable(set_aside_name(folder), entries, place);
     publisher.folder().remove_folder(set_aside_name(folder));  // what a kill may have left
   });
-  publisher.write(ranges_file(info.additions), to_json(stored));
+  publisher.write(additions_of(store) / ranges_file(""), to_json(stored));
   publisher.wait();
 }
 
 UniqueFd lock_store(const fs::path& store) {
+  if (is_zip(store))
+    throw UsageError(fmt::format(
+        "'{}' is a zip, which cannot be changed: unpack it, and name the folder", store.string()));
   UniqueFd lock = OutputFolder(store).make_folder(store / "isobrick");
   if (::flock(lock.get(), LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK)
     throw Error(fmt::format("another process is adding to '{}'", store.string()));
@@ -164,7 +175,7 @@ void add_missing_ranges(const fs::path& path, const Selection& volume, std::uint
     try {
       add_ranges(store, memory - std::min(memory, others), workers.threads(), progress);
     } catch (...) {
-      discard_unfinished(store.info());
+      discard_unfinished(store);
       throw;
     }
   });

@@ -51,7 +51,8 @@ class LevelIndex {
         level_(level),
         options_(options),
         entries_(StoreEntries::of(store.info().levels)),
-        place_(index_folder(store.info().additions, level, kind_of(options))),
+        place_(store.storage()->local_path() /
+               index_folder(store.info().additions, level, kind_of(options))),
         partial_(place_) {
     partial_ += ".partial";
     layout_.kind = kind_of(options);
@@ -93,7 +94,7 @@ class LevelIndex {
 
 /// Whether the description in `folder` is that of the index to build.
 bool LevelIndex::is_wanted(const fs::path& folder) const {
-  const fs::path file = index_description(folder);
+  const fs::path file = folder / kIndexDescription;
   const auto text = read_small_file(file, kMaxMetadataBytes);
   try {
     return text && parse_index_layout(*text, quoted(file)) == layout_;
@@ -114,8 +115,8 @@ void LevelIndex::check() const {
   if (options_.force) return;
   const bool finished = options_.resume && is_wanted(place_);
   if (fs::exists(place_) && !finished)
-    throw UsageError(fmt::format("'{}' has a {} index; --force replaces it",
-                                 store_.info().path.string(), layout_.kind));
+    throw UsageError(
+        fmt::format("'{}' has a {} index; --force replaces it", store_.info().name, layout_.kind));
   // Beside a finished one it is the one that was replaced.
   if (finished || !fs::exists(partial_)) return;
   if (!options_.resume)
@@ -123,7 +124,7 @@ void LevelIndex::check() const {
         fmt::format("an interrupted build is in '{}'; --resume goes on with it, --force starts "
                     "anew",
                     partial_.string()));
-  if (fs::exists(index_description(partial_)) && !is_wanted(partial_))
+  if (fs::exists(partial_ / kIndexDescription) && !is_wanted(partial_))
     throw UsageError(
         fmt::format("'{}' was begun with another leaf; resume with the same one, or "
                     "--force starts anew",
@@ -135,15 +136,15 @@ void LevelIndex::prepare(Publisher& publisher) {
   if (finished_ || !(options_.resume && is_wanted(partial_))) remove(publisher.folder(), partial_);
   if (finished_) return;
   for_each_point({{0, 0, 0}, layout_.chunks()},
-                 [&](Int3 c) { publisher.discard_temporary(index_chunk_path(partial_, c)); });
-  publisher.write(index_description(partial_), to_json(layout_));
+                 [&](Int3 c) { publisher.discard_temporary(partial_ / index_chunk_name(c)); });
+  publisher.write(partial_ / kIndexDescription, to_json(layout_));
   publisher.wait();  // before any chunk, which would else be of nobody knows what
 }
 
 void LevelIndex::build_chunk(const IndexChunkBuilder& builder, const IndexChunkName& name,
                              Publisher& publisher) const {
   const Int3 c = name.chunk;
-  IndexChunkWriter writer(publisher, index_chunk_path(partial_, c), layout_.parts_of_chunk(c),
+  IndexChunkWriter writer(publisher, partial_ / index_chunk_name(c), layout_.parts_of_chunk(c),
                           name);
   builder.build(
       c, [&](std::vector<std::byte> part) { return encode_index_part(layout_.zstd_level, part); },
@@ -157,7 +158,7 @@ void LevelIndex::build(std::uint64_t memory, int threads, Publisher& publisher, 
   const std::uint32_t checksum = checksum_of(layout_);
   std::uint64_t bytes = 0;
   for_each_morton(layout_.chunks(), [&](Int3 c) {
-    const fs::path path = index_chunk_path(finished_ ? place_ : partial_, c);
+    const fs::path path = (finished_ ? place_ : partial_) / index_chunk_name(c);
     const IndexChunkName name{c, checksum};
     const bool kept = finished_ || (options_.resume &&
                                     IndexChunk::is_whole(path, layout_.parts_of_chunk(c), name));
@@ -169,9 +170,9 @@ void LevelIndex::build(std::uint64_t memory, int threads, Publisher& publisher, 
   });
   publisher.wait();
   for_each_morton(layout_.chunks(), [&](Int3 c) {
-    bytes += fs::file_size(index_chunk_path(finished_ ? place_ : partial_, c));
+    bytes += fs::file_size((finished_ ? place_ : partial_) / index_chunk_name(c));
   });
-  bytes += fs::file_size(index_description(finished_ ? place_ : partial_));
+  bytes += fs::file_size((finished_ ? place_ : partial_) / kIndexDescription);
   report.level_bytes.push_back(bytes);
 }
 
@@ -182,7 +183,7 @@ void complete_ranges(std::unique_ptr<StoreReader>& store, const IndexOptions& op
   if (!anew && has_all_ranges(*store)) return;
   Stopwatch watch;
   add_ranges(*store, options.memory, threads, progress);
-  store = std::make_unique<StoreReader>(store->info().path, options.selection);
+  store = std::make_unique<StoreReader>(store->storage(), options.selection);
   report.ranges_added = true;
   report.range_seconds = watch.lap();
 }

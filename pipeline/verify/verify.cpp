@@ -10,9 +10,10 @@
 
 #include <isobrick/error.h>
 #include <isobrick/store_reader.h>
+#include "bricks/storage/storage_keys.h"
 #include "bricks/stored_index.h"
 #include "bricks/zarr/json_reader.h"
-#include "io/bytes/file.h"
+#include "bricks/zarr/store_names.h"
 #include "pipeline/histogram/histogram.h"
 #include "pipeline/index/level_scan.h"
 #include "pipeline/program_memory.h"
@@ -194,26 +195,27 @@ void verify_level(const StoreReader& store, int level, int threads, std::uint64_
 }
 
 /// The groups of a store of ours, which other programs need and ours does not.
-void verify_groups(const StoreInfo& store, DamageList& damages) {
-  if (!store.ours) return;
-  const auto check = [&](const std::filesystem::path& file, bool version2) {
+void verify_groups(const StoreReader& store, DamageList& damages) {
+  if (!store.info().ours) return;
+  const Storage& storage = *store.storage();
+  const auto check = [&](const std::string& key, bool version2) {
+    const std::string where = quoted(storage, key);
     try {
-      const auto text = read_small_file(file, kMaxMetadataBytes);
-      if (!text) return damages.add(quoted(file) + " is missing");
-      const nlohmann::json parsed = parse_json(*text, quoted(file));
-      const JsonReader group(parsed, quoted(file));
+      const auto text = read_small_object(storage, key, kMaxMetadataBytes);
+      if (!text) return damages.add(where + " is missing");
+      const nlohmann::json parsed = parse_json(*text, where);
+      const JsonReader group(parsed, where);
       if (group.at("zarr_format").integer() != (version2 ? 2 : 3) ||
           (!version2 && group.string_at("node_type") != "group"))
-        damages.add(quoted(file) + " is no group");
+        damages.add(where + " is no group");
     } catch (const Error& e) {
       damages.add(e.what());
     }
   };
-  const std::filesystem::path additions = store.path / "isobrick";
-  if (std::filesystem::exists(store.path / ".zattrs")) check(store.path / ".zgroup", true);
-  check(additions / "zarr.json", false);
-  for (std::size_t i = 0; i < store.levels.size(); ++i)
-    check(additions / std::to_string(i) / "zarr.json", false);
+  if (storage.open(".zattrs")) check(".zgroup", true);
+  check("isobrick/zarr.json", false);
+  for (std::size_t i = 0; i < store.info().levels.size(); ++i)
+    check(level_addition("", static_cast<int>(i), "zarr.json"), false);
 }
 
 /// The kinds of index of each level. That a level lacks one which another has is damage, and so is
@@ -223,7 +225,7 @@ std::vector<std::vector<std::string>> find_indexes(const StoreReader& store, Dam
   std::set<std::string> all;
   bool seen = true;
   for (std::size_t level = 0; level < levels.size(); ++level) try {
-      levels[level] = index_folder_kinds(store.info().additions, static_cast<int>(level));
+      levels[level] = index_folder_kinds(store, static_cast<int>(level));
       all.insert(levels[level].begin(), levels[level].end());
     } catch (const Error& e) {
       damages.add(fmt::format("level {}: {}", level, e.what()));
@@ -260,7 +262,7 @@ VerifyReport verify(const std::filesystem::path& path, int threads, Progress& pr
   }
   progress.begin("verify", bytes);
   threads = Workers(threads).threads();
-  verify_groups(store->info(), damages);
+  verify_groups(*store, damages);
   for (std::size_t level = 0; level < levels.size(); ++level)
     verify_level(*store, static_cast<int>(level), threads, memory, damages, progress);
   progress.end();

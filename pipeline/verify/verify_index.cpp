@@ -72,7 +72,7 @@ std::optional<std::string> IndexCheck::wrong(const IndexChunk& chunk, Box3 brick
   try {
     if (!chunk.read(part, bytes)) {
       if (!expected.bytes) return std::nullopt;
-      return fmt::format("{} has no such part", quoted(chunk.path()));
+      return fmt::format("'{}' has no such part", chunk.name());
     }
   } catch (const DamageError& e) {
     return e.what();
@@ -132,8 +132,9 @@ std::uint64_t verify_index(const StoreReader& store, int level, const std::strin
                            Progress& progress) {
   const auto known = parse_index_kind(kind);
   if (!known || *known == IndexKind::linear) {
-    damage(fmt::format("level {}: '{}' is no kind of index that this program knows", level,
-                       index_folder(store.info().additions, level, kind).string()));
+    damage(
+        fmt::format("level {}: '{}' is no kind of index that this program knows", level,
+                    store.storage()->name_of(index_folder(store.info().additions, level, kind))));
     return 0;
   }
   try {

@@ -49,6 +49,7 @@ const std::map<std::string, Names> kPublicHeaders = {
     {"io/meshes", {"mesh_file_sink"}},
     {"bricks", {"store_reader"}},
     {"bricks/ranges", {"range_table"}},
+    {"bricks/storage", {"storage"}},
     {"bricks/zarr", {"image_metadata", "level_info"}},
     {"index", {"index_kind"}},
     {"surface", {"mesh", "mesh_sinks", "surface_options", "surface_report"}},

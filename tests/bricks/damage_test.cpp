@@ -65,7 +65,7 @@ TEST(Damage, TheMessageNamesLevelBrickFileAndOffset) {
   EXPECT_TRUE(store.read_brick(0, {0, 0, 0}, brick.data()));
   const auto place = store.locate(0, {1, 0, 0});
   ASSERT_TRUE(place);
-  EXPECT_EQ(place->file, shard);
+  EXPECT_EQ(place->key, "0/c/0/0/0");
   EXPECT_EQ(place->offset, 4100u);
   EXPECT_EQ(place->size, 4100u);
   try {
@@ -212,9 +212,9 @@ TEST(Damage, AHostileShapeIsRefusedAtOnce) {
     root["attributes"]["isobrick"]["metadata_crc32c"] =
         metadata_checksum(root.dump(), std::array{array.dump()}, "file");
     write_file(path / "zarr.json", root.dump());
-    StoredRanges ranges = *read_stored_ranges(path);
+    StoredRanges ranges = *read_stored_ranges(*folder_storage(path), "");
     ranges.image_crc32c = root["attributes"]["isobrick"]["metadata_crc32c"].get<std::uint32_t>();
-    write_file(ranges_file(path), to_json(ranges));
+    write_file(path / ranges_file(""), to_json(ranges));
     const auto begin = std::chrono::steady_clock::now();
     try {
       const StoreReader store(path);

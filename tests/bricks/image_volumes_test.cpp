@@ -53,7 +53,7 @@ TEST_F(ImageVolumesTest, WhatIsLeftOpenIsTheFirst) {
   EXPECT_EQ(text_of(first), "time 0, channel 0");
   const ImageVolumes chosen = image_volumes(image, {.channel = {}, .time = 2});
   EXPECT_EQ(text_of(chosen), "time 2, channel 0");
-  EXPECT_EQ(StoreReader(image, chosen.selection).info().additions.filename(), "time_2_channel_0");
+  EXPECT_EQ(StoreReader(image, chosen.selection).info().additions, "isobrick/time_2_channel_0");
   EXPECT_EQ(place_on(chosen.axes[0], chosen.selection), 2);
 }
 

@@ -5,6 +5,7 @@
 #include "bricks/ranges/checksummed_json.h"
 #include "bricks/ranges/index_layout.h"
 #include "bricks/ranges/stored_ranges.h"
+#include "bricks/storage/folder_storage.h"
 #include "tests/bricks/store_fixture.h"
 #include "tests/io/bytes/temp_dir.h"
 
@@ -31,7 +32,9 @@ class IndexChunkFile : public testing::TestWithParam<std::optional<int>> {
     writer.publish();
     publisher.wait();
   }
-  IndexChunk open() const { return {path, parts.size(), GetParam().has_value(), kName}; }
+  IndexChunk open(const IndexChunkName& name = kName) const {
+    return {open_file_object(path), parts.size(), GetParam().has_value(), name};
+  }
 
   void expect_refused(std::size_t at) const {
     EXPECT_THROW(
@@ -86,7 +89,7 @@ TEST_P(IndexChunkFile, EveryFlippedBitAndEveryCutIsNoticed) {
   write_file(path, whole + '\0');
   expect_refused(whole.size());
   std::filesystem::remove(path);
-  EXPECT_THROW(open(), DamageError);
+  EXPECT_FALSE(IndexChunk::is_whole(path, parts.size(), kName));
 }
 
 TEST_P(IndexChunkFile, AnotherPlaceOrIndexIsNoticed) {
@@ -94,7 +97,7 @@ TEST_P(IndexChunkFile, AnotherPlaceOrIndexIsNoticed) {
   for (const IndexChunkName& other : {IndexChunkName{{1, 2, 0}, kName.index_crc32c},
                                       IndexChunkName{{2, 1, 1}, kName.index_crc32c},
                                       IndexChunkName{kName.chunk, kName.index_crc32c + 1}}) {
-    EXPECT_THROW(IndexChunk(path, parts.size(), GetParam().has_value(), other), DamageError);
+    EXPECT_THROW(open(other), DamageError);
     EXPECT_FALSE(IndexChunk::is_whole(path, parts.size(), other));
   }
 }
@@ -123,7 +126,7 @@ TEST(IndexChunkPart, AClaimOfManyBytesCostsNoMemory) {
   writer.append(0, part);
   writer.publish();
   publisher.wait();
-  const IndexChunk chunk(folder / "0", 1, true, kName);
+  const IndexChunk chunk(open_file_object(folder / "0"), 1, true, kName);
   std::vector<std::byte> bytes;
   try {
     chunk.read(0, bytes);
@@ -181,18 +184,18 @@ TEST(IndexLayout, Geometry) {
 
 TEST(StoredRangesJson, RoundTripAndChanges) {
   const TemporaryFolder folder;
-  EXPECT_FALSE(read_stored_ranges(folder / "a"));
+  EXPECT_FALSE(read_stored_ranges(*folder_storage(folder / "a"), ""));
   const StoredRanges ranges{
       .may_have_nan = false, .image_crc32c = 0xfedcba98, .levels = {{1, 2, 3}, {3, 0xfedcba97, 4}}};
   const std::string text = to_json(ranges);
-  write_file(ranges_file(folder / "a"), text);
-  EXPECT_EQ(read_stored_ranges(folder / "a"), ranges);
+  write_file(folder / "a" / ranges_file(""), text);
+  EXPECT_EQ(read_stored_ranges(*folder_storage(folder / "a"), ""), ranges);
   for (std::size_t at = 0; at < text.size(); ++at) {
     if (text[at] == ' ' || text[at] == '\n') continue;
     std::string changed = text;
     changed[at] = static_cast<char>(changed[at] ^ 0x11);
-    write_file(ranges_file(folder / "a"), changed);
-    EXPECT_THROW(read_stored_ranges(folder / "a"), DamageError) << changed;
+    write_file(folder / "a" / ranges_file(""), changed);
+    EXPECT_THROW(read_stored_ranges(*folder_storage(folder / "a"), ""), DamageError) << changed;
   }
 }
 
@@ -202,8 +205,8 @@ TEST(StoredRangesJson, ANewerVersionWantsANewerProgram) {
   const auto message_for = [&](int version) {
     nlohmann::json json = read_checksummed_json(text, "");
     json["isobrick_ranges"] = version;
-    write_file(ranges_file(folder / "a"), checksum_json(json));
-    return message_of<Error>([&] { read_stored_ranges(folder / "a"); });
+    write_file(folder / "a" / ranges_file(""), checksum_json(json));
+    return message_of<Error>([&] { read_stored_ranges(*folder_storage(folder / "a"), ""); });
   };
   EXPECT_TRUE(message_for(1).ends_with("remove the file and run isobrick index")) << message_for(1);
   EXPECT_TRUE(message_for(9).ends_with("use a newer version of isobrick")) << message_for(9);

@@ -148,8 +148,7 @@ TEST_F(ZarrV2, ChannelsAndTimesWhereverChunksHoldThem) {
         const StoreReader store(path, {.channel = channel, .time = time});
         expect_counting(store, 0, (time * 4 + channel) * 4 * 5 * 7);
         EXPECT_EQ(store.info().additions,
-                  path / "isobrick" /
-                      ("time_" + std::to_string(time) + "_channel_" + std::to_string(channel)));
+                  "isobrick/time_" + std::to_string(time) + "_channel_" + std::to_string(channel));
         EXPECT_EQ(store.info().levels[0].decode_extra > 0, t * c > 1);
       }
     expect_refused<UsageError>("3 times: choose one with --time 0 … 2");
@@ -158,7 +157,7 @@ TEST_F(ZarrV2, ChannelsAndTimesWhereverChunksHoldThem) {
   }
   std::filesystem::remove_all(path);
   write_array(path, {1, 1, 4, 5, 7}, {1, 1, 4, 5, 7});
-  EXPECT_EQ(StoreReader(path).info().additions, path);
+  EXPECT_EQ(StoreReader(path).info().additions, "");
   expect_counting(StoreReader(path, {.channel = 0, .time = 0}), 0, 0);
   expect_refused<UsageError>("--time 1 is not there", {.time = 1});
 }
@@ -195,7 +194,7 @@ TEST_F(ZarrV2, AnAxisWithoutARoleTakesTheOneThatIsFree) {
   write({"phase", "c"});
   expect_counting(StoreReader(path, {.channel = 1, .time = 2}), 0, (2 * 4 + 1) * 2 * 5 * 7);
   EXPECT_EQ(StoreReader(path, {.channel = 1, .time = 2}).info().additions,
-            path / "isobrick" / "time_2_channel_1");
+            "isobrick/time_2_channel_1");
   expect_refused<UsageError>("axis 'phase': choose one with --time 0 … 2", {.channel = 0});
 }
 

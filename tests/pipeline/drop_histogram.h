@@ -9,10 +9,10 @@ namespace isobrick::test {
 
 /// Makes a store one that keeps no histogram.
 inline void drop_histogram(const std::filesystem::path& store) {
-  StoredRanges ranges = *read_stored_ranges(store);
+  StoredRanges ranges = *read_stored_ranges(*folder_storage(store), "");
   ranges.histogram.reset();
-  std::ofstream(ranges_file(store)) << to_json(ranges);
-  std::filesystem::remove_all(histogram_folder(store));
+  std::ofstream(store / ranges_file("")) << to_json(ranges);
+  std::filesystem::remove_all(store / histogram_folder(""));
 }
 
 }  // namespace isobrick::test

@@ -150,7 +150,7 @@ TEST_F(Export, TheGridAndTheDecodersShareOneBudget) {
 
 TEST_F(Export, LeavesNothingWhenABrickIsDamaged) {
   const auto place = *store_->locate(0, {1, 1, 1});
-  std::fstream f(place.file, std::ios::binary | std::ios::in | std::ios::out);
+  std::fstream f(folder_ / "a" / place.key, std::ios::binary | std::ios::in | std::ios::out);
   f.seekp(static_cast<std::streamoff>(place.offset));
   f << "????";
   f.close();

@@ -267,9 +267,9 @@ TEST_F(Extract, ALostShardIsNoEmptySpace) {
   const StoreReader whole = store(field, {.brick = 16, .shard = 32});
   const auto lost = whole.locate(0, {6, 3, 2});
   ASSERT_TRUE(lost);
-  fs::remove(lost->file);
+  fs::remove(whole.storage()->local_path() / lost->key);
   MemorySink sink;
-  EXPECT_THROW(run(StoreReader(whole.info().path), {.isovalue = 60}, sink), DamageError);
+  EXPECT_THROW(run(StoreReader(whole.storage()), {.isovalue = 60}, sink), DamageError);
   EXPECT_FALSE(sink.finished);
 }
 

@@ -176,9 +176,9 @@ TEST_F(ExtractTogether, WhateverFindsTheActiveBlocks) {
   for (const IndexKind kind :
        {IndexKind::interval, IndexKind::kdtree, IndexKind::quadtree, IndexKind::octree}) {
     NoProgress silent;
-    add_index(plain.info().path, {.kind = kind, .leaf = 8, .threads = 2}, silent);
+    add_index(plain.storage()->local_path(), {.kind = kind, .leaf = 8, .threads = 2}, silent);
   }
-  const StoreReader reader(plain.info().path);
+  const StoreReader reader(plain.storage()->local_path());
   const IndexChoice ranges{.automatic = false, .kind = {}};
   const Made alone = make_alone(reader, {.threads = 2, .index = ranges}, kRequests);
   for (const IndexKind kind :

@@ -16,8 +16,8 @@ class IndexDamage : public testing::TestWithParam<IndexKind> {
     convert_quietly(source, store_, {.levels = 1});
     for (const IndexKind kind : kStoredKinds) add_index_quietly(store_, {.kind = kind, .leaf = 8});
     mesh_ = mesh_of(store_, {.isovalue = 5}, std::nullopt);
-    for (const auto& [file, bytes] : tree_of(index_folder(store_, 0, kind_)))
-      files_.push_back(index_folder(store_, 0, kind_) / file);
+    for (const auto& [file, bytes] : tree_of(store_ / index_folder("", 0, kind_)))
+      files_.push_back(store_ / index_folder("", 0, kind_) / file);
     ASSERT_EQ(files_.size(), 2u);
   }
 
@@ -52,8 +52,9 @@ class IndexDamage : public testing::TestWithParam<IndexKind> {
     }
     parts[part] = std::move(content);
     Publisher publisher(store_);
-    IndexChunkWriter writer(publisher, index_chunk_path(index.folder(), {0, 0, 0}), count,
-                            index.name_of({0, 0, 0}));
+    IndexChunkWriter writer(publisher,
+                            store_ / index_folder("", 0, kind_) / index_chunk_name({0, 0, 0}),
+                            count, index.name_of({0, 0, 0}));
     for (std::size_t i = 0; i < count; ++i)
       if (parts[i]) writer.append(i, encode_index_part(3, *parts[i]));
     writer.publish();
@@ -99,8 +100,8 @@ TEST_P(IndexDamage, CutAndLostFilesAreNoticed) {
     }
     write(file, whole);
   }
-  fs::remove(index_chunk_path(index_folder(store_, 0, kind_), {0, 0, 0}));
-  expect_noticed(index_chunk_path(index_folder(store_, 0, kind_), {0, 0, 0}), "lost");
+  fs::remove(store_ / index_folder("", 0, kind_) / index_chunk_name({0, 0, 0}));
+  expect_noticed(store_ / index_folder("", 0, kind_) / index_chunk_name({0, 0, 0}), "lost");
 }
 
 TEST_P(IndexDamage, OtherKindsGoOnWorking) {
@@ -114,7 +115,7 @@ TEST_P(IndexDamage, OtherKindsGoOnWorking) {
 // Under right checksums: what is no such index is refused; what is one, but of
 // other ranges, is for verify to find.
 TEST_P(IndexDamage, ForeignPartsAreNoticed) {
-  const fs::path file = index_chunk_path(index_folder(store_, 0, kind_), {0, 0, 0});
+  const fs::path file = store_ / index_folder("", 0, kind_) / index_chunk_name({0, 0, 0});
   const std::string whole = content_of(file);
   using Ranges = std::vector<ValueRange<std::int16_t>>;
   const auto index_of = [&](IndexKind kind, Int3 grid) {
@@ -144,9 +145,9 @@ TEST_P(IndexDamage, ForeignPartsAreNoticed) {
 
 TEST_P(IndexDamage, OfSamplesIsNotBlamedOnTheIndex) {
   const auto place = *StoreReader(store_).locate(0, {1, 0, 0});
-  std::string bytes = content_of(place.file);
+  std::string bytes = content_of(store_ / place.key);
   bytes[place.offset + 9] ^= 1;
-  write(place.file, bytes);
+  write(store_ / place.key, bytes);
   const VerifyReport report = verify_quietly(store_);
   EXPECT_EQ(report.damage_count, 1u);
   EXPECT_NE(report.damages.at(0).find("brick (1, 0, 0)"), std::string::npos) << report.damages[0];
@@ -155,10 +156,10 @@ TEST_P(IndexDamage, OfSamplesIsNotBlamedOnTheIndex) {
 TEST_P(IndexDamage, AnIndexOfAnotherLevelIsNoticed) {
   MemorySource source = make_source<std::int16_t>({149, 70, 70}, 4);
   convert_quietly(source, folder_ / "b", {.levels = 1, .index = GetParam(), .leaf = 8});
-  fs::remove_all(index_folder(store_, 0, kind_));
-  fs::copy(index_folder(folder_ / "b", 0, kind_), index_folder(store_, 0, kind_),
+  fs::remove_all(store_ / index_folder("", 0, kind_));
+  fs::copy(folder_ / "b" / index_folder("", 0, kind_), store_ / index_folder("", 0, kind_),
            fs::copy_options::recursive);
-  expect_noticed(index_description(index_folder(store_, 0, kind_)), "another level");
+  expect_noticed(store_ / index_folder("", 0, kind_) / kIndexDescription, "another level");
 }
 
 INSTANTIATE_TEST_SUITE_P(Kinds, IndexDamage, testing::ValuesIn(kStoredKinds));

@@ -147,7 +147,7 @@ TEST_F(ForeignIndex, InterruptedRangesAreNone) {
     Stopping stopping(step == 0 ? "ranges" : "index", 0);
     EXPECT_THROW(add_index(foreign_, {.threads = 2}, stopping), Error);
     EXPECT_EQ(StoreReader(foreign_).has_ranges(0), step == 1);
-    EXPECT_TRUE(stored_index_kinds(foreign_, 0).empty());
+    EXPECT_TRUE(stored_index_kinds(StoreReader(foreign_), 0).empty());
   }
   add_index_quietly(foreign_, {.resume = true});
   EXPECT_EQ(verify_quietly(foreign_).damage_count, 0u);
@@ -157,9 +157,9 @@ TEST_F(ForeignIndex, DamagedBookkeepingIsRefused) {
   const Int3 extent{70, 40, 50};
   write_foreign(foreign_, extent, {20, 20, 20}, make_samples<float>(extent, 5));
   add_index_quietly(foreign_, {});
-  std::string text = content_of(ranges_file(foreign_));
+  std::string text = content_of(foreign_ / ranges_file(""));
   text.replace(text.find("false"), 5, "true");
-  std::ofstream(ranges_file(foreign_)) << text;
+  std::ofstream(foreign_ / ranges_file("")) << text;
   EXPECT_THROW(StoreReader{foreign_}, DamageError);
   EXPECT_EQ(verify_quietly(foreign_).damage_count, 1u);
 }

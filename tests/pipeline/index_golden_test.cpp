@@ -28,7 +28,7 @@ class IndexGolden : public testing::Test {
 
 TEST_F(IndexGolden, Octree) {
   add_index_quietly(store_, {.kind = IndexKind::octree, .leaf = 1});
-  const auto tree = tree_of(index_folder(store_, 0, "octree"));
+  const auto tree = tree_of(store_ / index_folder("", 0, "octree"));
   ASSERT_EQ(tree.size(), 2u);
   // Both checksums depend on how well zstd compresses the ranges.
   const StoredIndex index(StoreReader(store_), 0, "octree");

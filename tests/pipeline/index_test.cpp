@@ -120,7 +120,7 @@ TEST_F(Indexes, OfSeveralKindsLiveSideBySide) {
     // 17 × 9 × 1 index bricks; those wholly in the region have one value.
     EXPECT_EQ(parts(kind, 0), std::size_t{17 - 5} * 9);
   }
-  EXPECT_EQ(stored_index_kinds(store_, 0),
+  EXPECT_EQ(stored_index_kinds(StoreReader(store_), 0),
             (std::vector<std::string>{"interval", "kdtree", "octree", "quadtree"}));
   // Nothing else has changed.
   for (const auto& [file, bytes] : before) EXPECT_TRUE(tree_of(store_).at(file) == bytes) << file;
@@ -157,7 +157,7 @@ TEST_F(Indexes, AutoTakesTheFastestWhereLittleIsActive) {
 
 TEST_F(Indexes, BytesDependOnTheVolumeAlone) {
   add_index_quietly(store_, {.kind = IndexKind::kdtree, .leaf = 2});
-  const auto roomy = tree_of(index_folder(store_, 0, "kdtree"));
+  const auto roomy = tree_of(store_ / index_folder("", 0, "kdtree"));
   NoProgress silent;
   add_index(store_,
             {.kind = IndexKind::kdtree,
@@ -166,13 +166,13 @@ TEST_F(Indexes, BytesDependOnTheVolumeAlone) {
              .threads = 1,
              .force = true},
             silent);
-  EXPECT_TRUE(tree_of(index_folder(store_, 0, "kdtree")) == roomy);
+  EXPECT_TRUE(tree_of(store_ / index_folder("", 0, "kdtree")) == roomy);
   // Those of one and the same leaf are made of ranges alone, or of samples.
   std::vector<std::uint8_t> samples(static_cast<std::size_t>(volume(extent_)));
   MemorySource again(extent_, ScalarType::u8, samples_of(StoreReader(store_), 0));
   convert_quietly(again, folder_ / "b",
                   {.brick = 16, .shard = 32, .levels = 2, .index = IndexKind::kdtree, .leaf = 2});
-  EXPECT_TRUE(tree_of(index_folder(folder_ / "b", 0, "kdtree")) == roomy);
+  EXPECT_TRUE(tree_of(folder_ / "b" / index_folder("", 0, "kdtree")) == roomy);
 }
 
 TEST_F(Indexes, AreReplacedOnlyByForce) {
@@ -201,7 +201,7 @@ TEST_F(Indexes, AnInterruptedBuildIsNoneAndIsResumed) {
     fs::copy(store_, folder_ / "b", fs::copy_options::recursive);
     Stopping stopping("index", step);
     EXPECT_THROW(add_index(folder_ / "b", {.leaf = 4, .threads = 2}, stopping), Error);
-    EXPECT_TRUE(stored_index_kinds(folder_ / "b", 0).empty());
+    EXPECT_TRUE(stored_index_kinds(StoreReader(folder_ / "b"), 0).empty());
     EXPECT_THROW(mesh_of(folder_ / "b", {.isovalue = 77.5}, IndexKind::octree), UsageError);
     EXPECT_EQ(verify_quietly(folder_ / "b").damage_count, 0u);
     // Neither silently thrown away nor mixed with another leaf.
@@ -221,9 +221,9 @@ TEST_F(Indexes, AnInterruptedBuildIsNoneAndIsResumed) {
 TEST_F(Indexes, AResumeMakesAnewWhatIsNotWhole) {
   Stopping stopping("index", 5);
   EXPECT_THROW(add_index(store_, {.leaf = 4, .threads = 2}, stopping), Error);
-  const fs::path partial = index_folder(store_, 0, "octree.partial");
-  fs::resize_file(index_chunk_path(partial, {0, 0, 0}), 100);
-  std::ofstream(index_chunk_path(partial, {1, 1, 0}).string() + ".tmp") << "half";
+  const fs::path partial = store_ / index_folder("", 0, "octree.partial");
+  fs::resize_file(partial / index_chunk_name({0, 0, 0}), 100);
+  std::ofstream(partial / (index_chunk_name({1, 1, 0}) + ".tmp")) << "half";
   const IndexReport report = add_index_quietly(store_, {.leaf = 4, .resume = true});
   EXPECT_EQ(report.chunks_kept, 5u);
   EXPECT_EQ(verify_quietly(store_).damage_count, 0u);
@@ -287,7 +287,7 @@ TEST_F(Indexes, AFailureLeavesTheStoreAsItWas) {
   std::ofstream(store_ / "isobrick/1/index") << "in the way";
   const auto before = tree_of(store_);
   EXPECT_NE(message_of([&] { add_index_quietly(store_, {}); }), "");
-  EXPECT_TRUE(stored_index_kinds(store_, 0).empty());
+  EXPECT_TRUE(stored_index_kinds(StoreReader(store_), 0).empty());
   auto after = tree_of(store_);
   std::erase_if(after, [](const auto& file) {
     return file.first.find("octree.partial/") != std::string::npos;

@@ -56,7 +56,7 @@ TEST_F(OpenVolume, AFileIsConvertedOnceAsConvertDoes) {
     EXPECT_NE(first.notes()[0].find("cache"), std::string::npos);
     const auto source = open_source(file, {});
     convert(*source, folder_ / "b.zarr", {.threads = 1}, silent_);
-    EXPECT_EQ(tree_of(first.store().info().path), tree_of(folder_ / "b.zarr"));
+    EXPECT_EQ(tree_of(first.store().storage()->local_path()), tree_of(folder_ / "b.zarr"));
   }
   const OpenedVolume second(file, options(), silent_);
   EXPECT_FALSE(second.converted());
@@ -85,7 +85,7 @@ TEST_F(OpenVolume, AStoreIsReadWhereItIsUnlessAPartIsRequested) {
   convert(*source, store, {.threads = 1}, silent_);
   const OpenedVolume whole(store, options(), silent_);
   EXPECT_FALSE(whole.converted());
-  EXPECT_EQ(whole.store().info().path, fs::path(store));
+  EXPECT_EQ(whole.store().storage()->local_path(), fs::path(store));
   EXPECT_FALSE(fs::exists(folder_ / "cache"));
   OpenOptions strided = options();
   strided.volume.stride = {2, 2, 2};
@@ -104,7 +104,7 @@ TEST_F(OpenVolume, WithoutACacheNothingStays) {
   fs::path store;
   {
     const OpenedVolume opened(raw("a"), none, silent_);
-    store = opened.store().info().path;
+    store = opened.store().storage()->local_path();
     EXPECT_TRUE(opened.converted());
     EXPECT_TRUE(fs::exists(store));
   }
@@ -124,7 +124,7 @@ TEST_F(OpenVolume, TheLimitRemovesWhatWasUsedLongestAgoButNothingOpen) {
   EXPECT_TRUE(OpenedVolume(b, options(), silent_).converted()) << "it was removed";
   // With no room at all it still works, and what is open stays until the next one.
   const OpenedVolume now(c, options(1), silent_);
-  EXPECT_TRUE(fs::exists(now.store().info().path));
+  EXPECT_TRUE(fs::exists(now.store().storage()->local_path()));
 }
 
 TEST_F(OpenVolume, ATemporaryStoreThatAKillLeftGoesWithTheNextOne) {
@@ -145,7 +145,7 @@ TEST_F(OpenVolume, ATemporaryStoreThatAKillLeftGoesWithTheNextOne) {
     const OpenedVolume opened(raw("a"), none, silent_);
     EXPECT_FALSE(fs::exists(left));
     const OpenedVolume beside(raw("b"), none, silent_);
-    EXPECT_TRUE(fs::exists(opened.store().info().path)) << "somebody holds it";
+    EXPECT_TRUE(fs::exists(opened.store().storage()->local_path())) << "somebody holds it";
   }
   ::setenv("TMPDIR", before.c_str(), 1);
   EXPECT_EQ(std::distance(fs::directory_iterator(temporary), fs::directory_iterator()), 1)
@@ -189,7 +189,7 @@ TEST_F(OpenVolume, ADamagedEntryIsMadeAnew) {
   fs::path store;
   {
     const OpenedVolume first(file, options(), silent_);
-    store = first.store().info().path;
+    store = first.store().storage()->local_path();
   }
   for (const fs::path& damaged : {store / "0/c/0/0/0", store / "zarr.json", store / "isobrick"}) {
     fs::remove_all(damaged);

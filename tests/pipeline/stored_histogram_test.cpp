@@ -26,7 +26,7 @@ class StoredCounts : public testing::Test {
   }
   StoreReader store(const char* name = "a") const { return StoreReader(folder_ / name); }
   fs::path chunk(const char* name = "a") const {
-    return histogram_folder(folder_ / name) / "c" / "0";
+    return folder_ / name / histogram_folder("") / "c" / "0";
   }
   /// What verify and readers report of the same damage.
   void expect_damaged(const std::string& part) {
@@ -38,9 +38,9 @@ class StoredCounts : public testing::Test {
     EXPECT_THROW(histogram(store(), silent), DamageError) << part;
   }
   void change_ranges(const std::function<void(StoredHistogram&)>& change) {
-    StoredRanges ranges = *read_stored_ranges(folder_ / "a");
+    StoredRanges ranges = *read_stored_ranges(*folder_storage(folder_ / "a"), "");
     change(*ranges.histogram);
-    std::ofstream(ranges_file(folder_ / "a")) << to_json(ranges);
+    std::ofstream(folder_ / "a" / ranges_file("")) << to_json(ranges);
   }
 
   TemporaryFolder folder_;
@@ -71,7 +71,7 @@ TEST_F(StoredCounts, AreNoPartThatAStoreNeeds) {
 TEST_F(StoredCounts, AreRefusedWhenTheyAreMissing) {
   fs::remove(chunk());
   expect_damaged("missing");
-  fs::remove_all(histogram_folder(folder_ / "a"));
+  fs::remove_all(folder_ / "a" / histogram_folder(""));
   expect_damaged("missing");
 }
 
@@ -85,12 +85,12 @@ TEST_F(StoredCounts, AreRefusedWhenTheyAreDamaged) {
 TEST_F(StoredCounts, AreRefusedWhenTheyAreThoseOfAnotherStore) {
   convert(3, "b");
   fs::copy_file(chunk("b"), chunk(), fs::copy_options::overwrite_existing);
-  fs::copy_file(histogram_folder(folder_ / "b") / "zarr.json",
-                histogram_folder(folder_ / "a") / "zarr.json",
+  fs::copy_file(folder_ / "b" / histogram_folder("") / "zarr.json",
+                folder_ / "a" / histogram_folder("") / "zarr.json",
                 fs::copy_options::overwrite_existing);
   expect_damaged("histogram");
   // With the right checksum too, they do not pass for those of these samples.
-  const StoredHistogram other = *read_stored_ranges(folder_ / "b")->histogram;
+  const StoredHistogram other = *read_stored_ranges(*folder_storage(folder_ / "b"), "")->histogram;
   change_ranges([&](StoredHistogram& h) { h = other; });
   NoProgress silent;
   const VerifyReport report = verify(folder_ / "a", 2, silent);

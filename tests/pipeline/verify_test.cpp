@@ -38,12 +38,12 @@ class Verify : public testing::Test {
 
 TEST_F(Verify, NamesADamagedBrickAndNothingElse) {
   const auto place = *StoreReader(folder_ / "a").locate(0, {1, 2, 1});
-  flip(place.file, place.offset + place.size / 2);
+  flip(folder_ / "a" / place.key, place.offset + place.size / 2);
   const VerifyReport report = check();
   ASSERT_EQ(report.damage_count, 1u);
   EXPECT_NE(report.damages[0].find("level 0"), std::string::npos);
   EXPECT_NE(report.damages[0].find("(1, 2, 1)"), std::string::npos);
-  EXPECT_NE(report.damages[0].find(place.file.string()), std::string::npos);
+  EXPECT_NE(report.damages[0].find((folder_ / "a" / place.key).string()), std::string::npos);
   EXPECT_NE(report.damages[0].find(std::to_string(place.offset)), std::string::npos);
 }
 
@@ -51,20 +51,20 @@ TEST_F(Verify, FindsEveryDamagedBrick) {
   const StoreReader store(folder_ / "a");
   for (const Int3 b : {Int3{0, 0, 0}, Int3{4, 3, 2}, Int3{2, 2, 4}}) {
     const auto place = *store.locate(0, b);
-    flip(place.file, place.offset);
+    flip(folder_ / "a" / place.key, place.offset);
   }
   EXPECT_EQ(check(1).damage_count, 3u);
   EXPECT_EQ(check(4).damage_count, 3u);
 }
 
 TEST_F(Verify, CountsABrokenShardIndexOnce) {
-  const auto file = StoreReader(folder_ / "a").locate(0, {0, 0, 0})->file;
+  const auto file = folder_ / "a" / StoreReader(folder_ / "a").locate(0, {0, 0, 0})->key;
   flip(file, std::filesystem::file_size(file) - 20);
   EXPECT_EQ(check().damage_count, 1u);
 }
 
 TEST_F(Verify, NoticesAMissingShardByItsRanges) {
-  std::filesystem::remove(StoreReader(folder_ / "a").locate(0, {0, 0, 0})->file);
+  std::filesystem::remove(folder_ / "a" / StoreReader(folder_ / "a").locate(0, {0, 0, 0})->key);
   EXPECT_GT(check().damage_count, 0u);
 }
 
@@ -77,11 +77,11 @@ TEST_F(Verify, ComparesRangesWithSamples) {
   options.brick = 16;
   options.shard = 48;
   convert_quietly(changed, folder_ / "b", options);
-  StoredRanges ranges = *read_stored_ranges(folder_ / "a");
-  const RangeChecksums other = read_stored_ranges(folder_ / "b")->levels[0];
+  StoredRanges ranges = *read_stored_ranges(*folder_storage(folder_ / "a"), "");
+  const RangeChecksums other = read_stored_ranges(*folder_storage(folder_ / "b"), "")->levels[0];
   ranges.levels[0].bricks = other.bricks;
   ranges.levels[0].blocks = other.blocks;
-  std::ofstream(ranges_file(folder_ / "a")) << to_json(ranges);
+  std::ofstream(folder_ / "a" / ranges_file("")) << to_json(ranges);
   for (const char* name : {"isobrick/0/range", "isobrick/0/block_range"}) {
     std::filesystem::remove_all(folder_ / "a" / name);
     std::filesystem::rename(folder_ / "b" / name, folder_ / "a" / name);

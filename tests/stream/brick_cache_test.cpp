@@ -84,7 +84,7 @@ TEST_F(Stream, CacheSaysWhichBrickIsDamaged) {
     const StoreReader store(path_);
     const auto place = store.locate(0, {3, 0, 0});
     ASSERT_TRUE(place);
-    std::fstream file(place->file, std::ios::in | std::ios::out | std::ios::binary);
+    std::fstream file(path_ / place->key, std::ios::in | std::ios::out | std::ios::binary);
     file.seekp(static_cast<std::streamoff>(place->offset + place->size / 2));
     file.put('x').put('y').put('z');
   }

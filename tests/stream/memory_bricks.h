@@ -35,7 +35,7 @@ class MemoryBricks final : public BrickSource {
   template <class T>
   MemoryBricks(Int3 extent, const std::function<T(Int3)>& f, const Options& options) {
     info_.type = scalar_type_of<T>;
-    info_.path = "memory";
+    info_.name = "memory";
     info_.fill_value = options.fill_value;
     info_.may_have_nan = std::is_floating_point_v<T>;
     std::vector<std::byte> samples(static_cast<std::size_t>(volume(extent)) * sizeof(T));

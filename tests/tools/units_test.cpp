@@ -207,7 +207,8 @@ TEST(OutputName, StemOfAnInput) {
   for (const auto& [path, stem] :
        {std::pair{"data/scan.nii.gz", "scan"}, std::pair{"series/", "series"},
         std::pair{"a/scan.h5:/array", "scan_array"}, std::pair{"scan.h5:/run/a", "scan_run_a"},
-        std::pair{"x.zarr///", "x"}, std::pair{"raw", "raw"}, std::pair{"a.b.nrrd", "a.b"}})
+        std::pair{"x.zarr///", "x"}, std::pair{"raw", "raw"}, std::pair{"a.b.nrrd", "a.b"},
+        std::pair{"x.zarr.zip", "x"}})
     EXPECT_EQ(stem_of_input(path), stem) << path;
   EXPECT_EQ(stem_of_input("x.vdb", {.grid = "fog/a"}), "x_fog_a");
   EXPECT_EQ(stem_of_input("x.zarr", {.selection = {.channel = 1, .time = {}}}), "x_c1");

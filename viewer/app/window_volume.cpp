@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include <isobrick/error.h>
+#include "bricks/storage/open_storage.h"
 #include "bricks/zarr/metadata_files.h"
 #include "core/file_error.h"
 #include "pipeline/index/add_ranges.h"
@@ -18,6 +19,14 @@
 // The volume of a window: opened, dropped, converted, chosen from an image.
 
 namespace isobrick {
+namespace {
+
+/// Whether the shown volume of a Zarr lacks ranges.
+bool lacks_ranges(const std::filesystem::path& path, const Selection& selection) {
+  return !has_all_ranges(StoreReader(path, image_volumes(path, selection).selection));
+}
+
+}  // namespace
 
 /// Replaces the volume; the settings stay.
 void ViewerWindow::load(const std::filesystem::path& path, const Selection& selection,
@@ -105,8 +114,8 @@ OpenOptions ViewerWindow::import_options() const {
 
 /// Starts to compute the ranges that a volume lacks; returns false if it lacks none.
 bool ViewerWindow::begin_ranges(const std::filesystem::path& path, const Selection& selection) {
+  if (!lacks_ranges(path, selection)) return false;
   const Selection shown = image_volumes(path, selection).selection;
-  if (has_all_ranges(StoreReader(path, shown))) return false;
   state_.import = std::make_unique<ImportJob>(path, shown, import_options());
   return true;
 }
@@ -115,7 +124,8 @@ bool ViewerWindow::begin_ranges(const std::filesystem::path& path, const Selecti
 void ViewerWindow::show(std::unique_ptr<OpenedVolume> opened, const std::filesystem::path& input,
                         const Selection& selection) {
   if (opened != nullptr)
-    open(opened->store().info().path, opened->store().info().selection, input.filename().string());
+    open(opened->store().storage()->local_path(), opened->store().info().selection,
+         input.filename().string());
   else
     open(input, selection);
   opened_ = std::move(opened);
@@ -123,7 +133,8 @@ void ViewerWindow::show(std::unique_ptr<OpenedVolume> opened, const std::filesys
 
 void ViewerWindow::drop(const std::filesystem::path& path) {
   try {
-    if (!is_zarr(path))
+    // A zip cannot be added to.
+    if (!is_zarr(path) || (is_zip(path) && lacks_ranges(path, {})))
       state_.import = std::make_unique<ImportJob>(path, import_options());
     else if (!begin_ranges(path, {}))
       show({}, path);

@@ -18,7 +18,7 @@ Vec3d turned_back(const Transform& t, Vec3d v) {
 void check_direction(const StoreInfo& info, const Transform& t) {
   for (std::size_t i = 0; i < 9; ++i)
     if (std::abs(t.direction[i] - info.levels.front().transform.direction[i]) > 1e-6)
-      throw Error("'" + info.path.string() +
+      throw Error("'" + info.name +
                   "': levels that lie at different angles cannot be shown together");
 }
 

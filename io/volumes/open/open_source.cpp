@@ -64,6 +64,10 @@ std::unique_ptr<VolumeSource> open_whole(const std::string& path, const VolumeRe
         "'{}' is a NanoVDB file, which cannot be read: make an OpenVDB file of it (nanovdb_convert "
         "IN.nvdb OUT.vdb) and convert that",
         file));
+  if (format == VolumeFormat::zip)
+    throw UsageError(fmt::format(
+        "'{}' is a zip, of which only a store is read (as a store, not as a file): unpack it",
+        file));
   if (format != VolumeFormat::vdb) refuse_grid(file, request);
   if (format == VolumeFormat::vti) return open_vti_if_built(file, inner, request);
   if (format == VolumeFormat::hdf5) return open_hdf5_if_built(file, inner, request);

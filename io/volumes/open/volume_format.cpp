@@ -11,6 +11,7 @@
 #include "io/bytes/file.h"
 #include "io/bytes/file_stream.h"
 #include "io/bytes/inflate_stream.h"
+#include "io/bytes/zip_signature.h"
 #include "io/volumes/raw/nifti_header.h"
 #include "io/volumes/raw/text_header.h"
 
@@ -62,6 +63,7 @@ std::optional<VolumeFormat> by_content(const std::string& path, std::string_view
   if (head.size() >= 132 && head.substr(128, 4) == "DICM") return VolumeFormat::dicom;
   if (head.starts_with(" BDV\0\0\0\0"sv)) return VolumeFormat::vdb;
   if (head.starts_with("NanoVDB")) return VolumeFormat::nanovdb;
+  if (is_zip_head(head)) return VolumeFormat::zip;
   if (head.starts_with("# vtk DataFile")) return VolumeFormat::legacy_vtk;
   if (head.starts_with("<") && head.substr(0, 1024).find("<VTKFile") != std::string_view::npos)
     return VolumeFormat::vti;
@@ -79,7 +81,7 @@ VolumeFormat format_of_extension(const std::string& path) {
       {".tif", VolumeFormat::tiff},       {".tiff", VolumeFormat::tiff},
       {".h5", VolumeFormat::hdf5},        {".hdf5", VolumeFormat::hdf5},
       {".dcm", VolumeFormat::dicom},      {".vdb", VolumeFormat::vdb},
-      {".nvdb", VolumeFormat::nanovdb},
+      {".nvdb", VolumeFormat::nanovdb},   {".zip", VolumeFormat::zip},
   };
   if (lower(path).ends_with(".nii.gz")) return VolumeFormat::nifti;
   const std::string extension = lower(std::filesystem::path(path).extension().string());
@@ -89,9 +91,9 @@ VolumeFormat format_of_extension(const std::string& path) {
 }
 
 std::string_view name_of(VolumeFormat format) {
-  constexpr std::array<std::string_view, 11> names{"raw",     "NRRD",       "MetaImage", "NIfTI",
+  constexpr std::array<std::string_view, 12> names{"raw",     "NRRD",       "MetaImage", "NIfTI",
                                                    "VTK XML", "legacy VTK", "TIFF",      "HDF5",
-                                                   "DICOM",   "OpenVDB",    "NanoVDB"};
+                                                   "DICOM",   "OpenVDB",    "NanoVDB",   "zip"};
   return names[static_cast<std::size_t>(format)];
 }
 
@@ -115,7 +117,8 @@ std::string volume_stem(const std::string& path) {
   std::filesystem::path file = std::filesystem::path(name).filename();
   if (file == "." || file == ".." || file.empty())
     file = std::filesystem::weakly_canonical(name, none).filename();
-  if (lower(file.extension().string()) == ".gz") file = file.stem();
+  for (const char* outer : {".gz", ".zip"})
+    if (lower(file.extension().string()) == outer) file = file.stem();
   const std::string stem = file.stem().string();
   return stem.empty() ? "volume" : stem;
 }

@@ -17,7 +17,8 @@ enum class VolumeFormat : std::uint8_t {
   hdf5,
   dicom,
   vdb,      ///< OpenVDB
-  nanovdb,  ///< recognised to be refused
+  nanovdb,  ///< recognised to be refused, and so is this:
+  zip,      ///< may hold a store, which a store's reader opens
 };
 
 /// The format's name for people: "NRRD".
@@ -39,7 +40,8 @@ struct VolumePath {
 /// Parts a path at its last ":/" unless a file has the whole name.
 VolumePath split_volume_path(const std::string& path);
 
-/// What a volume is called: "scan" of "data/scan.nii.gz", "series/" and "scan.nrrd:/array".
+/// What a volume is called: "scan" of "data/scan.nii.gz", "series/", "scan.zarr.zip" and
+/// "scan.nrrd:/array".
 std::string volume_stem(const std::string& path);
 
 }  // namespace isobrick

@@ -57,7 +57,7 @@ TEST(ImportJob, WithoutACacheTheStoreGoesWithTheVolume) {
   ImportJob job(dir / "ramp_40x30x20_uint8.raw", OpenOptions{});
   EXPECT_EQ(finished(job).failure, "");
   auto opened = job.take();
-  const std::filesystem::path store = opened->store().info().path;
+  const std::filesystem::path store = opened->store().storage()->local_path();
   EXPECT_TRUE(std::filesystem::exists(store));
   opened.reset();
   EXPECT_FALSE(std::filesystem::exists(store));

@@ -96,6 +96,15 @@ TEST_F(ViewPicture, FramesTheSurfaceAndNotTheVolume) {
       0);
 }
 
+TEST_F(ViewPicture, AStoreInAZipLooksTheSame) {
+  if (!available("zip")) GTEST_SKIP() << "no zip";
+  const std::string store = small_ball();
+  ASSERT_EQ(
+      run_process({"sh", "-c", "cd \"$0\" && zip -q -0 -r ../ball.zarr.zip .", store}).exit_code,
+      0);
+  EXPECT_TRUE(view(store, {}).rgb == view(path("ball.zarr.zip"), {}).rgb);
+}
+
 TEST_F(ViewPicture, AnEyeOfItsOwnIsWhereItIs) {
   const std::string store = small_ball();
   const Arguments eye{"--camera", "eye=80:-300:80,target=80:80:80"};

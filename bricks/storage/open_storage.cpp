@@ -1,0 +1,26 @@
+#include "bricks/storage/open_storage.h"
+
+#include <fmt/format.h>
+
+#include <isobrick/error.h>
+#include <isobrick/storage.h>
+#include "io/bytes/file.h"
+#include "io/bytes/zip_signature.h"
+
+namespace isobrick {
+
+namespace fs = std::filesystem;
+
+bool is_zip(const fs::path& path) {
+  std::error_code none;
+  if (!fs::is_regular_file(path, none)) return false;
+  return path.extension() == ".zip" || is_zip_head(open_input(path).text_at(0, 4));
+}
+
+std::shared_ptr<const Storage> open_storage(const fs::path& path) {
+  if (fs::is_directory(path)) return folder_storage(path);
+  if (is_zip(path)) return zip_storage(path);
+  throw Error(fmt::format("'{}' is no store: neither a folder nor a zip", path.string()));
+}
+
+}  // namespace isobrick

@@ -1,0 +1,10 @@
+#pragma once
+
+#include <filesystem>
+
+namespace isobrick {
+
+/// Whether a file is a zip, by its content or else by its name.
+bool is_zip(const std::filesystem::path& path);
+
+}  // namespace isobrick

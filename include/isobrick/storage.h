@@ -1,0 +1,87 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace isobrick {
+
+/// An object of a storage, open to read. Thread-safe.
+class StoredObject {
+ public:
+  virtual ~StoredObject() = default;
+
+  /// How messages name it, without quotes: "scan.zarr/0/c/0/0/1".
+  virtual std::string name() const = 0;
+  /// Bytes that it has.
+  virtual std::uint64_t size() const = 0;
+  /// Fills `bytes` with those from `offset` on. Throws DamageError where the object ends before,
+  /// Error where it cannot be read.
+  virtual void read(std::uint64_t offset, std::span<std::byte> bytes) const = 0;
+  /// Hints that these bytes are read soon: an implementation may begin to fetch them, several such
+  /// ranges together. Waits for nothing and throws nothing.
+  virtual void will_need(std::uint64_t offset, std::uint64_t size) const;
+};
+
+/// What a store is read from: objects by key, a relative name such as "0/c/0/0/1", whose parts "/"
+/// separates. No key has an empty part, "." or "..". Read only and thread-safe. For a place of your
+/// own derive from this class, or use function_storage().
+class Storage {
+ public:
+  virtual ~Storage() = default;
+
+  /// How messages name it, without quotes: "scan.zarr".
+  virtual std::string name() const = 0;
+  /// How messages name the object of a key, be it there or not: "scan.zarr.zip:/0/c/0/0/1".
+  virtual std::string name_of(const std::string& key) const;
+  /// Opens an object; null where there is none. Throws Error where it cannot be known. A reader
+  /// keeps at most 128 objects open, and may close and open them again.
+  virtual std::shared_ptr<const StoredObject> open(const std::string& key) const = 0;
+  /// The first part of each key below "`folder`/", or of each key where `folder` is empty; in no
+  /// particular order. Throws Error where it cannot be known.
+  virtual std::vector<std::string> list(const std::string& folder) const = 0;
+  /// The folder or file on this machine in which all objects lie; empty where there is none.
+  virtual std::filesystem::path local_path() const;
+};
+
+/// The files in a folder: "x/y" is the file y in its folder x.
+std::shared_ptr<const Storage> folder_storage(const std::filesystem::path& folder);
+
+/// The entries of a zip, which must be stored without compression. The keys are the names of the
+/// entries, or what follows "TOP/" in them where the only Zarr in the zip lies in its folder TOP.
+/// Keeps the names of the entries in memory, never their bytes. Throws DamageError for a zip that
+/// is damaged; opening a compressed or an encrypted entry throws Error.
+std::shared_ptr<const Storage> zip_storage(const std::filesystem::path& file);
+/// The same of a zip that is itself an object of some storage.
+std::shared_ptr<const Storage> zip_storage(std::shared_ptr<const StoredObject> zip);
+
+/// Objects in memory, by key. `name` is for messages.
+std::shared_ptr<const Storage> memory_storage(std::map<std::string, std::vector<std::byte>> objects,
+                                              std::string name = "memory");
+
+/// What a storage is made of by function_storage(). Called by several threads at once.
+struct StorageFunctions {
+  /// Bytes of the object of a key; nullopt where there is none.
+  std::function<std::optional<std::uint64_t>(const std::string& key)> size;
+  /// Fills `bytes` with those of an object from `offset` on, which all lie within it.
+  std::function<void(const std::string& key, std::uint64_t offset, std::span<std::byte> bytes)>
+      read;
+  /// As Storage::list(); empty: nothing is listed, so that `info` and verify() see no index.
+  std::function<std::vector<std::string>(const std::string& folder)> list;
+};
+
+/// A storage of the caller's functions; what they throw reaches the reader. `name` is for messages.
+std::shared_ptr<const Storage> function_storage(StorageFunctions functions, std::string name);
+
+/// A folder or a zip, whichever `path` is. Throws Error where it is neither, and what zip_storage()
+/// does.
+std::shared_ptr<const Storage> open_storage(const std::filesystem::path& path);
+
+}  // namespace isobrick

@@ -1,0 +1,83 @@
+#include "tests/tools/program.h"
+
+// The program reads stores in zips that others have made.
+namespace isobrick::test {
+namespace {
+
+class ZippedStore : public ProgramTest, public testing::WithParamInterface<std::string> {
+ protected:
+  /// A zip of a store, made as the documents say, or by Python.
+  std::string zip_of(const std::string& store) {
+    const std::string zip = store + ".zip";
+    const std::string python =
+        "import os, sys, zipfile\n"
+        "store, out = sys.argv[1:]\n"
+        "with zipfile.ZipFile(out, 'w') as zip:\n"
+        "  for folder, _, names in os.walk(store):\n"
+        "    for name in names:\n"
+        "      file = os.path.join(folder, name)\n"
+        "      zip.write(file, os.path.relpath(file, os.path.dirname(store)))\n";
+    if (GetParam() == "python3")
+      EXPECT_EQ(run_process({"python3", "-c", python, store, zip}).exit_code, 0);
+    else
+      shell("cd \"$0\" && zip -q -0 -r \"$1\" .", store, zip);
+    return zip;
+  }
+  static void shell(const std::string& script, const std::string& folder, const std::string& zip) {
+    const Outcome outcome = run_process({"sh", "-c", script, folder, zip});
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  }
+  std::string mesh(const std::string& input, const Arguments& more = {}) {
+    Arguments arguments{"extract", input, "--isovalue", "128", "-o", path("m.ply"), "--force"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    const Outcome outcome = run(arguments);
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+    EXPECT_EQ(outcome.err, "");
+    return read_file(path("m.ply"));
+  }
+  void SetUp() override {
+    if (!available(GetParam())) GTEST_SKIP() << "no " << GetParam();
+  }
+};
+
+TEST_P(ZippedStore, IsReadByEveryCommandThatReadsAStore) {
+  const std::string store = make_store("a", {"--build-index", "octree"}), zip = zip_of(store);
+  const std::string expected = mesh(store);
+  EXPECT_TRUE(mesh(zip) == expected);
+  EXPECT_TRUE(mesh(zip, {"--search", "octree"}) == expected);
+  EXPECT_EQ(run({"verify", zip}).exit_code, 0);
+  nlohmann::json info = run_json({"info", zip, "--stats"}),
+                 other = run_json({"info", store, "--stats"});
+  EXPECT_GT(info["bytes"], other["bytes"]);
+  for (const char* key : {"extent", "levels", "histogram", "indexes", "value_range"})
+    EXPECT_EQ(info[key], other[key]) << key;
+  ASSERT_EQ(run({"export", zip, path("x.raw")}).exit_code, 0);
+  ASSERT_EQ(run({"export", store, path("y.raw")}).exit_code, 0);
+  EXPECT_TRUE(read_file(path("x.raw")) == read_file(path("y.raw")));
+  ASSERT_EQ(run({"convert", zip, path("b.zarr")}).exit_code, 0);
+  EXPECT_TRUE(mesh(path("b.zarr")) == expected);
+}
+
+TEST_P(ZippedStore, IsNamedInMessagesAndNotChanged) {
+  const std::string zip = zip_of(make_store("a")), before = read_file(zip);
+  expect_refused(run({"index", zip}), 2, {"a.zarr.zip' is a zip, which cannot be changed"});
+  expect_refused(run({"export", zip, zip, "--format", "raw", "--force"}), 2, {"a.zarr.zip"});
+  EXPECT_TRUE(read_file(zip) == before);
+  write_file(zip, before.substr(0, before.size() / 2));
+  expect_refused(run({"info", zip}), 1, {"a.zarr.zip' is a damaged zip"});
+  EXPECT_EQ(run({"verify", zip}).exit_code, 1);
+}
+
+INSTANTIATE_TEST_SUITE_P(Makers, ZippedStore, testing::Values("zip", "python3"),
+                         [](const auto& maker) { return maker.param; });
+
+TEST_F(ProgramTest, ACompressedZipIsRefusedWithTheCommandThatMakesAnother) {
+  if (!available("zip")) GTEST_SKIP() << "no zip";
+  const std::string store = make_store("a");
+  ASSERT_EQ(run_process({"sh", "-c", "cd \"$0\" && zip -q -9 -r ../a.zarr.zip .", store}).exit_code,
+            0);
+  expect_refused(run({"info", path("a.zarr.zip")}), 1, {"is compressed", "zip -0 -r"});
+}
+
+}  // namespace
+}  // namespace isobrick::test
