@@ -149,6 +149,24 @@ TEST(Includes, FollowTheTable) {
   EXPECT_GT(seen, 1000) << "the test reads the wrong folder";
 }
 
+// So a header that does not compile alone shows when its source is compiled.
+TEST(Includes, SourcesBeginWithTheirHeader) {
+  int seen = 0;
+  for_each_file([&](const fs::path& path, const std::string&) {
+    const fs::path name = fs::relative(path, kRoot);
+    const std::string header = fs::path(name).replace_extension(".h").string();
+    const bool is_source =
+        path.extension() == ".cpp" ||
+        (path.extension() == ".cu" && !fs::exists(fs::path(path).replace_extension(".cpp")));
+    if (!is_source || !fs::exists(kRoot / header)) return;
+    const std::vector<std::string> names = includes_of(path);
+    ASSERT_FALSE(names.empty()) << path;
+    EXPECT_EQ(names.front(), header) << path;
+    ++seen;
+  });
+  EXPECT_GT(seen, 200) << "the test reads the wrong folder";
+}
+
 TEST(Includes, NameFilesThatExist) {
   for_each_include([&](const fs::path& path, const std::string&, const std::string& name) {
     EXPECT_TRUE(fs::exists(is_public(name) ? kRoot / "include" / name : kRoot / name))
