@@ -4,6 +4,8 @@
 //
 //   bench_arrays --gyroid 512 --types u8,i16,f32,f64 --threads 2
 //   bench_arrays --raw bonsai_256x256x256_uint8.raw --isovalue 45
+//   bench_arrays --function --gyroid 1024 --memory 64   # computed where it is read, never in
+//   memory
 // Built as in bench/README.md.
 
 #include <fmt/format.h>
@@ -17,6 +19,7 @@
 #include <string>
 #include <vector>
 
+#include <isobrick/mesh_sinks.h>
 #include <isobrick/volume_extractor.h>
 #include "bench/guarded_main.h"
 #include "bench/median.h"
@@ -47,22 +50,62 @@ Run measure(const std::function<void()>& work) {
   return {took.count(), page_faults() - before};
 }
 
-template <class T>
-Volume gyroid(Index n, double periods) {
-  Volume v{{n, n, n}, scalar_type_of<T>, {}};
-  v.samples.resize(static_cast<std::size_t>(n * n * n) * sizeof(T));
-  std::vector<double> s(static_cast<std::size_t>(n)), c(s.size());
-  for (std::size_t i = 0; i < s.size(); ++i) {
-    const double angle = static_cast<double>(i) * periods * 2 * M_PI / static_cast<double>(n);
-    s[i] = std::sin(angle);
-    c[i] = std::cos(angle);
+/// A gyroid that can be computed anywhere.
+class Gyroid {
+ public:
+  Gyroid(Index n, double periods) : s_(static_cast<std::size_t>(n)), c_(s_.size()) {
+    for (std::size_t i = 0; i < s_.size(); ++i) {
+      const double angle = static_cast<double>(i) * periods * 2 * M_PI / static_cast<double>(n);
+      s_[i] = std::sin(angle);
+      c_[i] = std::cos(angle);
+    }
   }
-  T* out = reinterpret_cast<T*>(v.samples.data());
-  for (std::size_t z = 0; z < s.size(); ++z)
-    for (std::size_t y = 0; y < s.size(); ++y)
-      for (std::size_t x = 0; x < s.size(); ++x)
-        *out++ = static_cast<T>(63.5 + 21 * (s[x] * c[y] + s[y] * c[z] + s[z] * c[x]));
+  Int3 extent() const {
+    const auto n = static_cast<Index>(s_.size());
+    return {n, n, n};
+  }
+  template <class T>
+  void read(Box3 box, T* out) const {
+    for_each_point(box, [&](Int3 p) {
+      const auto x = static_cast<std::size_t>(p.x), y = static_cast<std::size_t>(p.y),
+                 z = static_cast<std::size_t>(p.z);
+      *out++ = static_cast<T>(63.5 + 21 * (s_[x] * c_[y] + s_[y] * c_[z] + s_[z] * c_[x]));
+    });
+  }
+
+ private:
+  std::vector<double> s_, c_;
+};
+
+template <class T>
+Volume in_memory(const Gyroid& gyroid) {
+  Volume v{gyroid.extent(), scalar_type_of<T>, {}};
+  v.samples.resize(static_cast<std::size_t>(volume(v.extent)) * sizeof(T));
+  gyroid.read({{0, 0, 0}, v.extent}, reinterpret_cast<T*>(v.samples.data()));
   return v;
+}
+
+/// Surfaces of samples that are computed where they are read.
+template <class T>
+void behind_function(const Gyroid& gyroid, const ExtractOptions& options) {
+  isobrick::Volume volume;
+  volume.extent = gyroid.extent();
+  volume.type = scalar_type_of<T>;
+  volume.concurrent_reads = true;
+  volume.read = [&](Box3 box, void* out) { gyroid.read(box, static_cast<T*>(out)); };
+  VolumeExtractor extractor(volume);
+  for (const char* which : {"first", "second"}) {
+    std::uint64_t triangles = 0;
+    FunctionSink sink([&](const MeshChunk& chunk) { triangles += chunk.triangles.size(); });
+    const Run run = measure([&] { extractor.extract(options, sink); });
+    rusage usage{};
+    getrusage(RUSAGE_SELF, &usage);
+    fmt::print(
+        "{}x{}x{} {} behind a function, {} MiB: {} surface {:.2f} s, {} triangles, peak of the "
+        "process {} MiB\n",
+        volume.extent.x, volume.extent.y, volume.extent.z, short_name(volume.type),
+        options.memory >> 20, which, run.seconds, triangles, usage.ru_maxrss >> 10);
+  }
 }
 
 void print(const std::string& what, const std::vector<Run>& runs, double peer) {
@@ -134,7 +177,8 @@ int run(int argc, char** argv) {
   Index n = 512;
   double isovalue = 63.5, periods = 6;
   int runs = 5;
-  bool normals = false;
+  bool normals = false, function = false;
+  std::uint64_t memory = 1024;
   std::vector<int> threads{1, 2};
   std::vector<std::string> types{"u8", "i16", "f32", "f64"};
   app.add_option("--raw", raw, "a raw volume (else gyroids)");
@@ -145,6 +189,8 @@ int run(int argc, char** argv) {
   app.add_option("--threads", threads)->delimiter(',');
   app.add_option("--runs", runs);
   app.add_flag("--normals", normals);
+  app.add_flag("--function", function, "compute the gyroid where it is read");
+  app.add_option("--memory", memory, "of that, MiB");
   CLI11_PARSE(app, argc, argv);
 #ifdef ISOBRICK_WITH_VTK
   fmt::print("VTK {}\n", VtkPeer::version());
@@ -156,11 +202,18 @@ int run(int argc, char** argv) {
     compare_with(read_raw(raw));
     return 0;
   }
+  const Gyroid gyroid(n, periods);
   for (const std::string& name : types) {
     const auto type = parse_scalar_type(name);
     if (!type) throw CLI::ValidationError("--types", "no sample type " + name);
-    compare_with(visit_scalar(
-        *type, [&](auto tag) { return gyroid<typename decltype(tag)::type>(n, periods); }));
+    visit_scalar(*type, [&](auto tag) {
+      using T = typename decltype(tag)::type;
+      if (!function) return compare_with(in_memory<T>(gyroid));
+      for (const int count : threads)
+        behind_function<T>(
+            gyroid,
+            {.isovalue = isovalue, .normals = normals, .memory = memory << 20, .threads = count});
+    });
   }
   return 0;
 }
