@@ -3,14 +3,13 @@
 #include <gtest/gtest.h>
 
 #include <isobrick/error.h>
+#include "pipeline/program_memory.h"
 #include "tests/pipeline/convert_store.h"
 #include "tests/pipeline/no_sink.h"
 #include "tests/stream/heap_memory.h"
 
 namespace isobrick::test {
 namespace {
-
-constexpr std::uint64_t kMiB = std::uint64_t{1} << 20;
 
 class NoSurface final : public SurfaceExtractor {
  public:

@@ -22,9 +22,9 @@ std::vector<T> downsampled(const std::vector<T>& in, Int3 extent, Int3 factors =
 constexpr Int3 kFactors[] = {{2, 2, 2}, {2, 2, 1}, {1, 2, 2}, {1, 1, 2}, {2, 1, 1}, {1, 2, 1}};
 
 template <class T>
-class Downsample : public testing::Test {};
-using IntegerTypes = testing::Types<std::uint8_t, std::int8_t, std::uint16_t, std::int16_t,
-                                    std::uint32_t, std::int32_t>;
+class Downsample : public ::testing::Test {};
+using IntegerTypes = ::testing::Types<std::uint8_t, std::int8_t, std::uint16_t, std::int16_t,
+                                      std::uint32_t, std::int32_t>;
 TYPED_TEST_SUITE(Downsample, IntegerTypes);
 
 TYPED_TEST(Downsample, IsTheExactMeanOfWhatExistsRoundedHalfUp) {

@@ -10,7 +10,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr ConvertOptions kOptions{.brick = 16, .shard = 64, .ome = OmeVersion::v04, .threads = 2};
+const ConvertOptions kOptions{.brick = 16, .shard = 64, .ome = OmeVersion::v04, .threads = 2};
 
 std::uint64_t damages(const fs::path& path) {
   NoProgress progress;

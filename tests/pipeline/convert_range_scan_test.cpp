@@ -10,9 +10,9 @@ using test::brute_range;
 using test::make_samples;
 
 template <class T>
-class RangeScan : public testing::Test {};
-using SampleTypes = testing::Types<std::uint8_t, std::int8_t, std::uint16_t, std::int16_t,
-                                   std::uint32_t, std::int32_t, float, double>;
+class RangeScan : public ::testing::Test {};
+using SampleTypes = ::testing::Types<std::uint8_t, std::int8_t, std::uint16_t, std::int16_t,
+                                     std::uint32_t, std::int32_t, float, double>;
 TYPED_TEST_SUITE(RangeScan, SampleTypes);
 
 /// Feeds a volume in boxes of at most `piece` and compares every range.

@@ -3,13 +3,12 @@
 #include <gtest/gtest.h>
 
 #include <isobrick/verify.h>
+#include "pipeline/program_memory.h"
 #include "pipeline/stored_bricks.h"
 #include "tests/pipeline/convert_store.h"
 
 namespace isobrick::test {
 namespace {
-
-constexpr std::uint64_t kMiB = std::uint64_t{1} << 20;
 
 /// A volume in memory that knows where it is the fill value.
 class SparseMemory final : public VolumeSource {

@@ -24,9 +24,9 @@ ConvertOptions small_bricks() {
 }
 
 template <class T>
-class Convert : public testing::Test {};
-using SampleTypes = testing::Types<std::uint8_t, std::int8_t, std::uint16_t, std::int16_t,
-                                   std::uint32_t, std::int32_t, float, double>;
+class Convert : public ::testing::Test {};
+using SampleTypes = ::testing::Types<std::uint8_t, std::int8_t, std::uint16_t, std::int16_t,
+                                     std::uint32_t, std::int32_t, float, double>;
 TYPED_TEST_SUITE(Convert, SampleTypes);
 
 TYPED_TEST(Convert, KeepsEverySampleAndItsRanges) {

@@ -69,7 +69,7 @@ TEST(ConvertThin, ChunksOfRanges) {
   EXPECT_EQ(range_chunk_extent({64, 3, 40}), (Int3{64, 8, 64}));
 }
 
-class ConvertThinStore : public testing::TestWithParam<Int3> {
+class ConvertThinStore : public ::testing::TestWithParam<Int3> {
  protected:
   /// The samples of every level, which must be whole.
   static std::vector<std::vector<std::byte>> levels_of(const std::filesystem::path& path) {
@@ -132,8 +132,9 @@ TEST_P(ConvertThinStore, ASmallBudgetAndAStreamWriteTheSame) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Shapes, ConvertThinStore,
-                         testing::Values(Int3{1, 1, 300'000}, Int3{3, 2, 70'000},
-                                         Int3{40'000, 3, 2}, Int3{700, 600, 1}, Int3{20, 9, 3000}));
+                         ::testing::Values(Int3{1, 1, 300'000}, Int3{3, 2, 70'000},
+                                           Int3{40'000, 3, 2}, Int3{700, 600, 1},
+                                           Int3{20, 9, 3000}));
 
 }  // namespace
 }  // namespace isobrick::test

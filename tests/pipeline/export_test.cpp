@@ -9,6 +9,7 @@
 
 #include <isobrick/error.h>
 #include <isobrick/export.h>
+#include "pipeline/program_memory.h"
 #include "tests/pipeline/convert_store.h"
 
 namespace isobrick {
@@ -16,13 +17,11 @@ namespace {
 
 using namespace test;
 
-constexpr std::uint64_t kMiB = std::uint64_t{1} << 20;
-
 std::string text_of(const std::vector<std::byte>& bytes) {
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
 
-class Export : public testing::Test {
+class Export : public ::testing::Test {
  protected:
   void SetUp() override {
     ConvertOptions options;

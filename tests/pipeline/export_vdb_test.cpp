@@ -11,14 +11,13 @@
 #include <isobrick/extract.h>
 #include <isobrick/open_source.h>
 #include "io/volumes/vdb/vdb_level_set.h"
+#include "pipeline/program_memory.h"
 #include "tests/pipeline/convert_store.h"
 
 namespace isobrick {
 namespace {
 
 using namespace test;
-
-constexpr std::uint64_t kMiB = std::uint64_t{1} << 20;
 
 /// Keeps the triangles of a mesh.
 class TriangleList final : public MeshSink {
@@ -36,7 +35,7 @@ class TriangleList final : public MeshSink {
   std::vector<openvdb::Vec3d> corners;  ///< three a triangle
 };
 
-class ExportVdb : public testing::Test {
+class ExportVdb : public ::testing::Test {
  protected:
   ExportVdb() { openvdb::initialize(); }
 

@@ -9,7 +9,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-class IndexDamage : public testing::TestWithParam<IndexKind> {
+class IndexDamage : public ::testing::TestWithParam<IndexKind> {
  protected:
   void SetUp() override {
     MemorySource source = make_source<std::int16_t>({150, 70, 70}, 4);
@@ -162,7 +162,7 @@ TEST_P(IndexDamage, AnIndexOfAnotherLevelIsNoticed) {
   expect_noticed(store_ / index_folder("", 0, kind_) / kIndexDescription, "another level");
 }
 
-INSTANTIATE_TEST_SUITE_P(Kinds, IndexDamage, testing::ValuesIn(kStoredKinds));
+INSTANTIATE_TEST_SUITE_P(Kinds, IndexDamage, ::testing::ValuesIn(kStoredKinds));
 
 }  // namespace
 }  // namespace isobrick::test

@@ -57,7 +57,7 @@ void write_foreign(const fs::path& path, Int3 extent, Int3 chunk, const std::vec
   });
 }
 
-class ForeignIndex : public testing::Test {
+class ForeignIndex : public ::testing::Test {
  protected:
   template <class T>
   void compare(Int3 extent, Int3 chunk, const std::vector<T>& samples, double iso) {

@@ -13,7 +13,7 @@
 namespace isobrick::test {
 namespace {
 
-class IndexGolden : public testing::Test {
+class IndexGolden : public ::testing::Test {
  protected:
   /// 3 × 2 × 2 samples: two cells with the ranges [10, 15] and [11, 30].
   void SetUp() override {

@@ -27,7 +27,7 @@ std::vector<double> isovalues() {
 
 using Case = std::tuple<Index, ScalarType, Index>;
 
-class IndexedMesh : public testing::TestWithParam<Case> {
+class IndexedMesh : public ::testing::TestWithParam<Case> {
  protected:
   TemporaryFolder folder_;
 };
@@ -68,12 +68,12 @@ TEST_P(IndexedMesh, IsTheOneOfTheRanges) {
 }
 
 INSTANTIATE_TEST_SUITE_P(All, IndexedMesh,
-                         testing::Combine(testing::Values(1, 2, 4, 8, 16),
-                                          testing::Values(ScalarType::u8, ScalarType::i16,
-                                                          ScalarType::f32),
-                                          testing::Values(16, 32, 64, 128)));
+                         ::testing::Combine(::testing::Values(1, 2, 4, 8, 16),
+                                            ::testing::Values(ScalarType::u8, ScalarType::i16,
+                                                              ScalarType::f32),
+                                            ::testing::Values(16, 32, 64, 128)));
 
-class Indexes : public testing::Test {
+class Indexes : public ::testing::Test {
  protected:
   /// Some chunks along two axes, with a region of one value.
   void SetUp() override {

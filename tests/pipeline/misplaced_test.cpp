@@ -11,10 +11,10 @@ namespace {
 namespace fs = std::filesystem;
 
 /// Two chunks of ranges and of the index along x, and shards of two bricks an edge.
-constexpr Int3 kExtent{560, 36, 33};
+constexpr Int3 kPlacedExtent{560, 36, 33};
 constexpr double kIsovalue = 1000;
 
-class Misplaced : public testing::Test {
+class Misplaced : public ::testing::Test {
  protected:
   void SetUp() override {
     make(store_, 1);
@@ -26,12 +26,12 @@ class Misplaced : public testing::Test {
   /// Waves on a slope, which falls in the twin.
   static void make(const fs::path& store, int sign) {
     std::vector<std::int16_t> samples;
-    for_each_point({{0, 0, 0}, kExtent}, [&](Int3 p) {
-      const Index x = sign > 0 ? p.x : kExtent.x - 1 - p.x;
+    for_each_point({{0, 0, 0}, kPlacedExtent}, [&](Int3 p) {
+      const Index x = sign > 0 ? p.x : kPlacedExtent.x - 1 - p.x;
       samples.push_back(
           static_cast<std::int16_t>(3 * x + 40 * ((p.x / 8 + p.y / 8 + p.z / 8) % 2) + p.y + p.z));
     });
-    MemorySource source(kExtent, ScalarType::i16, as_bytes(samples));
+    MemorySource source(kPlacedExtent, ScalarType::i16, as_bytes(samples));
     convert_quietly(source, store, {.brick = 16, .shard = 32, .levels = 1});
     for (const IndexKind kind : {IndexKind::octree, IndexKind::interval})
       add_index_quietly(store, {.kind = kind, .leaf = 8});
@@ -132,7 +132,7 @@ struct Alike {
   ConvertOptions options;
 };
 
-class MisplacedAlike : public testing::TestWithParam<Alike> {
+class MisplacedAlike : public ::testing::TestWithParam<Alike> {
  protected:
   static constexpr Int3 kCube{72, 70, 66};
 
@@ -257,19 +257,19 @@ TEST_P(MisplacedAlike, EveryReaderSeesIt) {
 
 INSTANTIATE_TEST_SUITE_P(
     Stores, MisplacedAlike,
-    testing::Values(Alike{"Noise", Content::noise, {.brick = 16, .shard = 32}},
-                    Alike{"NoiseWithoutCodec",
-                          Content::noise,
-                          {.brick = 16, .shard = 16, .zstd_level = std::nullopt}},
-                    Alike{"NoiseOme04", Content::noise, {.brick = 16, .ome = OmeVersion::v04}},
-                    Alike{"NoiseOme04WithoutCodec",
-                          Content::noise,
-                          {.brick = 16, .zstd_level = std::nullopt, .ome = OmeVersion::v04}},
-                    Alike{"Mask", Content::mask, {.brick = 16, .shard = 32}},
-                    Alike{"MaskOme04WithoutCodec",
-                          Content::mask,
-                          {.brick = 16, .zstd_level = std::nullopt, .ome = OmeVersion::v04}}),
-    [](const testing::TestParamInfo<Alike>& test) { return std::string(test.param.name); });
+    ::testing::Values(Alike{"Noise", Content::noise, {.brick = 16, .shard = 32}},
+                      Alike{"NoiseWithoutCodec",
+                            Content::noise,
+                            {.brick = 16, .shard = 16, .zstd_level = std::nullopt}},
+                      Alike{"NoiseOme04", Content::noise, {.brick = 16, .ome = OmeVersion::v04}},
+                      Alike{"NoiseOme04WithoutCodec",
+                            Content::noise,
+                            {.brick = 16, .zstd_level = std::nullopt, .ome = OmeVersion::v04}},
+                      Alike{"Mask", Content::mask, {.brick = 16, .shard = 32}},
+                      Alike{"MaskOme04WithoutCodec",
+                            Content::mask,
+                            {.brick = 16, .zstd_level = std::nullopt, .ome = OmeVersion::v04}}),
+    [](const ::testing::TestParamInfo<Alike>& test) { return std::string(test.param.name); });
 
 }  // namespace
 }  // namespace isobrick::test

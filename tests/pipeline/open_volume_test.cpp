@@ -20,7 +20,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-class OpenVolume : public testing::Test {
+class OpenVolume : public ::testing::Test {
  protected:
   /// A raw file of noise, whose name describes it.
   std::string raw(const std::string& name, std::uint32_t seed = 1) {

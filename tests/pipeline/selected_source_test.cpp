@@ -15,16 +15,16 @@
 namespace isobrick::test {
 namespace {
 
-constexpr Int3 kExtent{11, 7, 9};
+constexpr Int3 kStoredExtent{11, 7, 9};
 
 /// Sample (x, y, z) has its place in the array for its value.
 std::unique_ptr<MemorySource> numbered(bool random_access) {
-  std::vector<std::uint16_t> values(static_cast<std::size_t>(volume(kExtent)));
+  std::vector<std::uint16_t> values(static_cast<std::size_t>(volume(kStoredExtent)));
   std::iota(values.begin(), values.end(), std::uint16_t{0});
   std::vector<std::byte> bytes(values.size() * 2);
   std::memcpy(bytes.data(), values.data(), bytes.size());
-  auto source =
-      std::make_unique<MemorySource>(kExtent, ScalarType::u16, std::move(bytes), random_access);
+  auto source = std::make_unique<MemorySource>(kStoredExtent, ScalarType::u16, std::move(bytes),
+                                               random_access);
   source->mutable_info().transform.spacing = {0.5, 2, 1};
   source->mutable_info().transform.origin = {10, 20, 30};
   return source;
@@ -44,11 +44,11 @@ std::vector<T> read_all(VolumeSource& source, Index planes) {
 TEST(SelectedSource, BoxesAndStridesOfRandomAccessAndOfStreams) {
   for (const bool random_access : {true, false})
     for (const Int3 stride : {Int3{1, 1, 1}, Int3{2, 1, 3}, Int3{4, 4, 4}, Int3{20, 20, 20}})
-      for (const Box3 whole_box :
-           {Box3{{0, 0, 0}, kExtent}, Box3{{3, 2, 4}, {10, 7, 8}}, Box3{{0, 0, 8}, {11, 7, 9}}})
+      for (const Box3 whole_box : {Box3{{0, 0, 0}, kStoredExtent}, Box3{{3, 2, 4}, {10, 7, 8}},
+                                   Box3{{0, 0, 8}, {11, 7, 9}}})
         for (const Index planes : {1, 2, 9}) {
           // The box counts what the stride leaves.
-          const Box3 all{{0, 0, 0}, ceil_div(kExtent, stride)};
+          const Box3 all{{0, 0, 0}, ceil_div(kStoredExtent, stride)};
           const Box3 box = intersect(whole_box, all);
           if (box.empty()) continue;
           VolumeRequest request;
@@ -64,7 +64,7 @@ TEST(SelectedSource, BoxesAndStridesOfRandomAccessAndOfStreams) {
           EXPECT_EQ(source->random_access(), random_access);
           std::vector<std::uint16_t> expected;
           for_each_point(box, [&](Int3 p) {
-            expected.push_back(static_cast<std::uint16_t>(linear_index(p * stride, kExtent)));
+            expected.push_back(static_cast<std::uint16_t>(linear_index(p * stride, kStoredExtent)));
           });
           EXPECT_EQ(read_all<std::uint16_t>(*source, planes), expected);
           // A sample stays where it was in the world.
@@ -83,10 +83,10 @@ TEST(SelectedSource, ABoxInsideIsReadAsThatBox) {
   std::vector<std::uint16_t> values(4);
   source->read({{1, 1, 2}, {3, 3, 3}}, reinterpret_cast<std::byte*>(values.data()));
   EXPECT_EQ(values, (std::vector<std::uint16_t>{
-                        static_cast<std::uint16_t>(linear_index({3, 2, 4}, kExtent)),
-                        static_cast<std::uint16_t>(linear_index({6, 2, 4}, kExtent)),
-                        static_cast<std::uint16_t>(linear_index({3, 4, 4}, kExtent)),
-                        static_cast<std::uint16_t>(linear_index({6, 4, 4}, kExtent))}));
+                        static_cast<std::uint16_t>(linear_index({3, 2, 4}, kStoredExtent)),
+                        static_cast<std::uint16_t>(linear_index({6, 2, 4}, kStoredExtent)),
+                        static_cast<std::uint16_t>(linear_index({3, 4, 4}, kStoredExtent)),
+                        static_cast<std::uint16_t>(linear_index({6, 4, 4}, kStoredExtent))}));
 }
 
 TEST(SelectedSource, ARegionOfTheWorldIsCovered) {

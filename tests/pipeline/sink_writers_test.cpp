@@ -24,7 +24,7 @@ class CountingSink final : public MeshSink {
   bool finished = false;
 };
 
-class WriteTogether : public testing::Test {
+class WriteTogether : public ::testing::Test {
  protected:
   WriteTogether() {
     for (CountingSink& sink : sinks_) pointers_.push_back(&sink);

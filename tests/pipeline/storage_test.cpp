@@ -17,7 +17,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-class StoreInStorage : public testing::TestWithParam<std::string> {
+class StoreInStorage : public ::testing::TestWithParam<std::string> {
  protected:
   StoreInStorage() {
     auto source = make_source<std::uint16_t>({70, 66, 60}, 3);
@@ -58,10 +58,10 @@ TEST_P(StoreInStorage, AMissingChunkOfAnIndexIsNamed) {
             "'" + store.storage()->name_of(lost) + "' is missing");
 }
 
-INSTANTIATE_TEST_SUITE_P(Kinds, StoreInStorage, testing::ValuesIn(storage_kinds()),
+INSTANTIATE_TEST_SUITE_P(Kinds, StoreInStorage, ::testing::ValuesIn(storage_kinds()),
                          [](const auto& kind) { return kind.param; });
 
-class Zip : public testing::Test {
+class Zip : public ::testing::Test {
  protected:
   Zip() {
     auto source = make_source<std::uint16_t>({40, 36, 33}, 3);

@@ -16,7 +16,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-class StoredCounts : public testing::Test {
+class StoredCounts : public ::testing::Test {
  protected:
   StoredCounts() { convert(2, "a"); }
 

@@ -39,7 +39,7 @@ SampleCounts count(const std::vector<T>& samples, Index width = 0, Int3 box = {1
 }
 
 template <class T>
-class ValueCountsOf : public testing::Test {
+class ValueCountsOf : public ::testing::Test {
  protected:
   /// Samples of several kinds, a multiple of 256 of each.
   static std::vector<std::vector<T>> sets() {
@@ -99,8 +99,8 @@ class ValueCountsOf : public testing::Test {
   }
 };
 
-using SampleTypes = testing::Types<std::uint8_t, std::int8_t, std::uint16_t, std::int16_t,
-                                   std::uint32_t, std::int32_t, float, double>;
+using SampleTypes = ::testing::Types<std::uint8_t, std::int8_t, std::uint16_t, std::int16_t,
+                                     std::uint32_t, std::int32_t, float, double>;
 TYPED_TEST_SUITE(ValueCountsOf, SampleTypes);
 
 TYPED_TEST(ValueCountsOf, AreThoseOfTheDefinitionInEveryOrder) {

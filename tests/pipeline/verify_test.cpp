@@ -10,7 +10,7 @@ namespace {
 
 using namespace test;
 
-class Verify : public testing::Test {
+class Verify : public ::testing::Test {
  protected:
   void SetUp() override {
     MemorySource source = make_source<std::uint16_t>({90, 70, 66}, 2);
