@@ -5,7 +5,7 @@
 #include <atomic>
 #include <cmath>
 #include <cstring>
-#include <mutex>
+#include <functional>
 #include <stdexcept>
 
 #include <isobrick/error.h>
@@ -20,6 +20,15 @@ using testing::Field;
 template <class T>
 Volume volume_of(const Field<T>& field) {
   return Volume::of(field.samples.data(), field.extent);
+}
+
+/// A function that copies the samples of a box of a field, which must outlive it.
+template <class T>
+std::function<void(Box3, void*)> reader_of(const Field<T>& field) {
+  return [&field](Box3 box, void* out) {
+    auto* to = static_cast<T*>(out);
+    for_each_point(box, [&](Int3 p) { *to++ = field.at(p); });
+  };
 }
 
 bool same(const Mesh& mesh, const testing::Mesh& expected) {
@@ -120,10 +129,7 @@ TYPED_TEST(VolumeOf, FunctionGivesTheSameMesh) {
       Volume volume = volume_of(field);
       volume.samples = nullptr;
       volume.concurrent_reads = concurrent;
-      volume.read = [&](Box3 box, void* out) {
-        auto* to = static_cast<TypeParam*>(out);
-        for_each_point(box, [&](Int3 p) { *to++ = field.at(p); });
-      };
+      volume.read = reader_of(field);
       EXPECT_TRUE(same(extract(volume, options), expected));
       // One region at a time, and the ranges of the first extraction.
       VolumeExtractor extractor(volume);
@@ -159,10 +165,7 @@ TYPED_TEST(VolumeOf, MissingSamplesAreNaN) {
   EXPECT_TRUE(same(extract(volume, options), expected));
   Volume read = volume;
   read.samples = nullptr;
-  read.read = [&](Box3 box, void* out) {
-    auto* to = static_cast<TypeParam*>(out);
-    for_each_point(box, [&](Int3 p) { *to++ = field.at(p); });
-  };
+  read.read = reader_of(field);
   EXPECT_TRUE(same(extract(read, options), expected));
 }
 
@@ -190,9 +193,8 @@ TEST(VolumeExtractor, LaterIsovaluesAndRegionsUseWhatIsKnown) {
   Volume volume = volume_of(field);
   volume.samples = nullptr;
   volume.concurrent_reads = true;
-  volume.read = [&](Box3 box, void* out) {
-    auto* to = static_cast<float*>(out);
-    for_each_point(box, [&](Int3 p) { *to++ = field.at(p); });
+  volume.read = [&, copy = reader_of(field)](Box3 box, void* out) {
+    copy(box, out);
     read += static_cast<std::uint64_t>(isobrick::volume(box.extent()));
   };
   VolumeExtractor in_memory(volume_of(field)), by_function(volume);
