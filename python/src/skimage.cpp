@@ -1,6 +1,9 @@
 #include <pybind11/numpy.h>
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -18,7 +21,8 @@ namespace {
 
 namespace py = pybind11;
 
-/// The cell that a triangle lies in: its vertices lie on the cell's edges.
+/// The cell that a triangle lies in: its vertices lie on the cell's edges. All extents are 2 or
+/// more.
 Int3 cell_of(const Mesh& mesh, const Triangle& triangle, Int3 extent) {
   Vec3d sum;
   for (const std::uint32_t vertex : triangle) {
@@ -27,42 +31,62 @@ Int3 cell_of(const Mesh& mesh, const Triangle& triangle, Int3 extent) {
   }
   Int3 cell;
   for (int axis = 0; axis < 3; ++axis)
-    cell[axis] = std::clamp(static_cast<Index>(std::floor(sum[axis] / 3)), Index{0},
-                            std::max(extent[axis] - 2, Index{0}));
+    cell[axis] =
+        std::clamp(static_cast<Index>(std::floor(sum[axis] / 3)), Index{0}, extent[axis] - 2);
   return cell;
+}
+
+void check_cells(const Volume& volume) {
+  for (int axis = 0; axis < 3; ++axis)
+    if (volume.extent[axis] < 2)
+      throw UsageError("an array of less than 2×2×2 samples has no cell");
 }
 
 /// The largest sample of a cell less the smallest.
 template <class T>
-double cell_range(const Volume& volume, Int3 cell) {
-  const auto* first = static_cast<const std::byte*>(volume.samples);
-  double lo = std::numeric_limits<double>::infinity(), hi = -lo;
-  for_each_point({cell, min(cell + Int3{2, 2, 2}, volume.extent)}, [&](Int3 p) {
+float cell_range(const Volume& volume, Int3 cell) {
+  const auto* first = static_cast<const std::byte*>(volume.samples) + dot(cell, volume.strides);
+  const Int3 s = volume.strides;
+  T lo{}, hi{};
+  for (unsigned corner = 0; corner < 8; ++corner) {
+    const Index offset = (corner & 1 ? s.x : 0) + (corner & 2 ? s.y : 0) + (corner & 4 ? s.z : 0);
     T sample;
-    std::memcpy(&sample, first + dot(p, volume.strides), sizeof(T));
-    lo = std::min(lo, static_cast<double>(sample));
-    hi = std::max(hi, static_cast<double>(sample));
-  });
-  return hi - lo;
+    std::memcpy(&sample, first + offset, sizeof(T));
+    lo = corner == 0 ? sample : std::min(lo, sample);
+    hi = corner == 0 ? sample : std::max(hi, sample);
+  }
+  return static_cast<float>(static_cast<double>(hi) - static_cast<double>(lo));
+}
+
+void raise_to(float& value, float to) {
+  const std::atomic_ref<float> shared(value);
+  float now = shared.load(std::memory_order_relaxed);
+  while (now < to && !shared.compare_exchange_weak(now, to, std::memory_order_relaxed)) {
+  }
 }
 
 /// For each vertex the largest range of the samples of a cell with a triangle there.
 py::array_t<float> vertex_ranges(const Mesh& mesh, const py::array& samples) {
   const Volume volume = volume_of(samples);
+  check_cells(volume);
   py::array_t<float> ranges(static_cast<py::ssize_t>(mesh.positions.size()));
   float* out = ranges.mutable_data();
   std::fill(out, out + mesh.positions.size(), 0.0f);
   const py::gil_scoped_release release;
   visit_scalar(volume.type, [&](auto tag) {
-    Int3 last{-1, -1, -1};
-    float range = 0;
-    for (const Triangle& triangle : mesh.triangles.span()) {
-      const Int3 cell = cell_of(mesh, triangle, volume.extent);
-      if (!(cell == last))
-        range = static_cast<float>(cell_range<typename decltype(tag)::type>(volume, cell));
-      last = cell;
-      for (const std::uint32_t vertex : triangle) out[vertex] = std::max(out[vertex], range);
-    }
+    using T = typename decltype(tag)::type;
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, mesh.triangles.size(), 4096),
+                      [&](const auto& part) {
+                        Int3 last{-1, -1, -1};
+                        float range = 0;
+                        for (std::size_t i = part.begin(); i < part.end(); ++i) {
+                          const Int3 cell = cell_of(mesh, mesh.triangles[i], volume.extent);
+                          if (!(cell == last)) range = cell_range<T>(volume, cell);
+                          last = cell;
+                          for (const std::uint32_t vertex : mesh.triangles[i])
+                            raise_to(out[vertex], range);
+                        }
+                      });
   });
   return ranges;
 }
@@ -70,6 +94,7 @@ py::array_t<float> vertex_ranges(const Mesh& mesh, const py::array& samples) {
 /// Keeps the triangles of the cells whose highest corner is set in a mask, and their vertices.
 void keep_cells(Mesh& mesh, const py::array& mask) {
   const Volume flags = volume_of(mask, ScalarType::u8);
+  check_cells(flags);
   const auto* first = static_cast<const std::byte*>(flags.samples);
   const py::gil_scoped_release release;
   std::size_t kept = 0;
