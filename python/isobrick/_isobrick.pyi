@@ -163,6 +163,15 @@ def convert_file(
 def convert_array(
     array: np.ndarray, transform: Transform, out: str, options: ConvertOptions, report: Report
 ) -> dict[str, Any]: ...
+def convert_function(
+    read: Callable[[Zyx, Zyx], np.ndarray],
+    extent: Zyx,
+    type: str,
+    transform: Transform,
+    out: str,
+    options: ConvertOptions,
+    report: Report,
+) -> dict[str, Any]: ...
 def index(
     path: str,
     kind: str,

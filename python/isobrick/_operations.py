@@ -58,7 +58,8 @@ def convert(source, path, *, progress=None, **options):
     Parameters
     ----------
     source : str, path, or array [z, y, x]
-        A file or folder as of `isobrick.open`, or an array in memory.
+        A file or folder as of `isobrick.open`, or an array as of `Extractor`, read by blocks
+        where it is not in memory.
     path : str or path
         The store, such as "ct.zarr". It has its name once it is whole.
     brick, shard : int
@@ -83,14 +84,9 @@ def convert(source, path, *, progress=None, **options):
     Returns a dictionary of what was done: bytes_in, bytes_out, levels, bricks, seconds, ….
     """
     store, others = _split(options)
-    if hasattr(source, "dtype") and hasattr(source, "shape") and not hasattr(source, "store"):
-        samples = Samples(source, **others)
-        if not samples.in_memory:
-            raise UsageError("an array that is converted must be a numpy.ndarray")
+    if hasattr(source, "dtype") and hasattr(source, "shape"):
         with reporting(progress) as report:
-            return _isobrick.convert_array(
-                samples.array, samples.transform, path_text(path), store, report
-            )
+            return Samples(source, **others).convert(path_text(path), store, report)
     request = volume_request(memory=store.memory, threads=store.threads, **others)
     with reporting(progress) as report:
         return _isobrick.convert_file(source_path(source), path_text(path), request, store, report)

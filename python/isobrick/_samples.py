@@ -80,8 +80,7 @@ class Samples:
                 "array is a numpy.ma.MaskedArray; give array.data and "
                 "mask=~numpy.ma.getmaskarray(array)"
             )
-        if not isinstance(array, np.ndarray) and not _is_lazy(array):
-            array = np.asarray(array)
+        array = _in_memory_or_lazy(array)
         self.shape = _check_shape(array.shape)
         self.dtype = check_dtype(array.dtype)
         if isinstance(array, np.ndarray) and array.dtype != self.dtype:
@@ -101,15 +100,37 @@ class Samples:
         """The extractor of the C++ layer."""
         if self.in_memory:
             return _isobrick.ArrayExtractor.of_array(self.array, self.transform, nodata, self.mask)
-        name = "uint8" if self.dtype == np.dtype("?") else self.dtype.name
         return _isobrick.ArrayExtractor.of_function(
-            BlockReader(self.array, np.dtype(name)), self.shape, name, self.transform, nodata,
-            self.mask,
+            *self._reader(), self.transform, nodata, self.mask
         )
 
+    def convert(self, path, options, report):
+        """Writes a store."""
+        if self.in_memory:
+            return _isobrick.convert_array(self.array, self.transform, path, options, report)
+        return _isobrick.convert_function(*self._reader(), self.transform, path, options, report)
 
-def _is_lazy(array):
-    return all(hasattr(array, name) for name in ("shape", "dtype", "__getitem__"))
+    def _reader(self):
+        """What reads boxes, the shape, and the name of the type."""
+        dtype = np.dtype("uint8") if self.dtype == np.dtype("?") else self.dtype
+        return BlockReader(self.array, dtype), self.shape, dtype.name
+
+
+def _in_memory_or_lazy(array):
+    """A NumPy array without a copy where there is memory, else what can be read by blocks."""
+    if isinstance(array, np.ndarray):
+        return array
+    if hasattr(array, "__dlpack_device__"):
+        device, _ = array.__dlpack_device__()
+        if device != 1:
+            raise TypeError(
+                f"array ({type(array).__name__}) is in the memory of a device; copy it to the host"
+            )
+        return np.from_dlpack(array)
+    is_lazy = all(hasattr(array, name) for name in ("shape", "dtype", "__getitem__"))
+    if is_lazy and not hasattr(array, "__array_interface__"):
+        return array
+    return np.asarray(array)
 
 
 def _is_xarray(array):
@@ -143,5 +164,11 @@ def _of_xarray(array, spacing, origin, direction, unit):
                 ),
                 None,
             )
-    data = array.variable._data if hasattr(array, "variable") else array.data
-    return (data if isinstance(data, np.ndarray) else array.data), spacing, origin, direction, unit
+    return _data_of(array), spacing, origin, direction, unit
+
+
+def _data_of(array):
+    """The samples of a DataArray: those in memory, those of dask, or itself where neither is."""
+    if array.chunks is not None or isinstance(getattr(array.variable, "_data", None), np.ndarray):
+        return array.data
+    return array

@@ -2,13 +2,10 @@
 
 #include <pybind11/numpy.h>
 
-#include <cstring>
 #include <memory>
 #include <mutex>
 #include <string>
 #include <utility>
-
-#include <fmt/format.h>
 
 #include <isobrick/error.h>
 #include <isobrick/mesh_file_sink.h>
@@ -19,28 +16,6 @@
 
 namespace isobrick::python {
 namespace {
-
-/// Calls a Python function with the bounds of a box, which returns its samples.
-class PythonReader {
- public:
-  PythonReader(py::object function, ScalarType type)
-      : function_(std::move(function)), type_(type) {}
-
-  void operator()(Box3 box, void* out) const {
-    const py::gil_scoped_acquire acquire;
-    const py::array block = function_(box.lo, box.hi);
-    const Int3 n = box.extent();
-    const bool fits = block.ndim() == 3 && block.shape(0) == n.z && block.shape(1) == n.y &&
-                      block.shape(2) == n.x && scalar_type(block) == type_ &&
-                      (block.flags() & py::array::c_style) != 0;
-    if (!fits) throw UsageError("what reads samples gave an array of another shape or type");
-    std::memcpy(out, block.data(), static_cast<std::size_t>(block.nbytes()));
-  }
-
- private:
-  py::object function_;
-  ScalarType type_;
-};
 
 /// Surfaces of an array, which it keeps alive.
 class ArrayExtractor {
@@ -106,14 +81,8 @@ std::unique_ptr<ArrayExtractor> of_array(const py::array& samples, const Transfo
 std::unique_ptr<ArrayExtractor> of_function(const py::object& read, Int3 extent, ScalarType type,
                                             const Transform& transform,
                                             std::optional<double> nodata, const py::object& mask) {
-  Volume volume;
-  volume.extent = extent;
-  volume.type = type;
+  Volume volume = volume_of(read, extent, type);
   volume.transform = transform;
-  // A copy of a std::function must not count references without the GIL.
-  volume.read = [reader = std::make_shared<const PythonReader>(read, type)](Box3 box, void* out) {
-    (*reader)(box, out);
-  };
   add_missing(volume, nodata, mask);
   return std::make_unique<ArrayExtractor>(volume, read, mask);
 }

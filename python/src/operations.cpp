@@ -62,14 +62,24 @@ py::dict convert_file(const std::string& path, const std::string& out, const Vol
   }));
 }
 
-py::dict convert_array(const py::array& array, const Transform& transform, const std::string& out,
-                       const ConvertOptions& options, const py::object& callback) {
-  Volume volume = volume_of(array);
+py::dict convert_volume(Volume volume, const Transform& transform, const std::string& out,
+                        const ConvertOptions& options, const py::object& callback) {
   volume.transform = transform;
   return describe(interruptible(callback, [&](Reporter reporter) {
     ArraySource source(volume, "array");
     return convert(source, out, options, reporter.progress);
   }));
+}
+
+py::dict convert_array(const py::array& array, const Transform& transform, const std::string& out,
+                       const ConvertOptions& options, const py::object& callback) {
+  return convert_volume(volume_of(array), transform, out, options, callback);
+}
+
+py::dict convert_function(const py::object& read, Int3 extent, ScalarType type,
+                          const Transform& transform, const std::string& out,
+                          const ConvertOptions& options, const py::object& callback) {
+  return convert_volume(volume_of(read, extent, type), transform, out, options, callback);
 }
 
 py::dict index_store(const std::string& path, const std::string& kind, Index leaf,
@@ -156,6 +166,7 @@ void bind_operations(py::module_& module) {
   bind_convert_options(module);
   module.def("convert_file", &convert_file);
   module.def("convert_array", &convert_array);
+  module.def("convert_function", &convert_function);
   module.def("index", &index_store);
   module.def("verify", &verify_store);
   module.def("describe", &describe_path);

@@ -3,10 +3,14 @@
 #include <fmt/format.h>
 
 #include <bit>
+#include <cstring>
+#include <memory>
 #include <string>
+#include <utility>
 
 #include <isobrick/error.h>
 #include <isobrick/lattice.h>
+#include "python/src/casters.h"
 
 namespace isobrick::python {
 namespace {
@@ -23,6 +27,28 @@ std::optional<ScalarType> type_of(char order, char kind, py::ssize_t bytes) {
   }
   return std::nullopt;
 }
+
+/// Calls a Python function with the bounds of a box, which returns its samples.
+class PythonReader {
+ public:
+  PythonReader(py::object function, ScalarType type)
+      : function_(std::move(function)), type_(type) {}
+
+  void operator()(Box3 box, void* out) const {
+    const py::gil_scoped_acquire acquire;
+    const py::array block = function_(box.lo, box.hi);
+    const Int3 n = box.extent();
+    const bool fits = block.ndim() == 3 && block.shape(0) == n.z && block.shape(1) == n.y &&
+                      block.shape(2) == n.x && scalar_type(block) == type_ &&
+                      (block.flags() & py::array::c_style) != 0;
+    if (!fits) throw UsageError("what reads samples gave an array of another shape or type");
+    std::memcpy(out, block.data(), static_cast<std::size_t>(block.nbytes()));
+  }
+
+ private:
+  py::object function_;
+  ScalarType type_;
+};
 
 }  // namespace
 
@@ -58,6 +84,17 @@ Volume volume_of(const py::array& array) {
     throw UsageError(fmt::format("samples of dtype {} are not supported",
                                  py::cast<std::string>(py::str(array.dtype()))));
   return volume_of(array, *type);
+}
+
+Volume volume_of(const py::object& read, Int3 extent, ScalarType type) {
+  Volume volume;
+  volume.extent = extent;
+  volume.type = type;
+  // A copy of a std::function must not count references without the GIL.
+  volume.read = [reader = std::make_shared<const PythonReader>(read, type)](Box3 box, void* out) {
+    (*reader)(box, out);
+  };
+  return volume;
 }
 
 }  // namespace isobrick::python

@@ -19,4 +19,9 @@ Volume volume_of(const pybind11::array& array);
 /// The same with samples taken for those of another type of their size.
 Volume volume_of(const pybind11::array& array, ScalarType type);
 
+/// Samples that a Python function reads: read(lo, hi), both (z, y, x), returns a new array [z, y,
+/// x] of `type` in C order. It is called with the GIL, from one thread at a time. The volume keeps
+/// the function alive. What it raises ends the operation.
+Volume volume_of(const pybind11::object& read, Int3 extent, ScalarType type);
+
 }  // namespace isobrick::python

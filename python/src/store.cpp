@@ -83,9 +83,16 @@ py::array read_samples(const OpenedVolume& volume, int level, Box3 box, int thre
   py::array samples(py::dtype(std::string(zarr_name(store.info().type))),
                     std::vector<py::ssize_t>{n.z, n.y, n.x});
   auto* out = static_cast<std::byte*>(samples.mutable_data());
-  run_interruptibly(py::none(), [&](Reporter) {
+  const Index rows = level_of(store, level).lattice.brick.z;
+  run_interruptibly(py::none(), [&](Reporter reporter) {
     Workers workers(threads);
-    workers.execute([&] { read_slab(store, level, box, out); });
+    for (Box3 part = box; part.lo.z < box.hi.z; part.lo.z = part.hi.z) {
+      if (reporter.cancel.stop_requested()) return;
+      part.hi.z = std::min(box.hi.z, (part.lo.z / rows + 1) * rows);
+      const auto before = static_cast<std::size_t>((part.lo.z - box.lo.z) * n.y * n.x);
+      workers.execute(
+          [&] { read_slab(store, level, part, out + before * size_of(store.info().type)); });
+    }
   });
   return samples;
 }

@@ -107,3 +107,50 @@ def test_xarray_over_dask():
     field = ball()
     lazy = xarray.DataArray(field, dims=("z", "y", "x")).chunk(20)
     assert same(isobrick.extract(lazy, 1), isobrick.extract(field, 1))
+
+
+def test_xarray_over_a_file_stays_there(tmp_path):
+    xarray = pytest.importorskip("xarray")
+    pytest.importorskip("zarr")
+    field = ball((100, 90, 80), 30)
+    xarray.DataArray(field, dims=("z", "y", "x"), name="a").to_dataset().to_zarr(tmp_path / "a")
+    array = xarray.open_dataset(tmp_path / "a", engine="zarr", chunks=None)["a"]
+    assert same(isobrick.extract(array, 1), isobrick.extract(field, 1))
+    assert not array.variable._in_memory
+
+
+class Exchanged:
+    """Memory of another library, by DLPack alone."""
+
+    def __init__(self, array, device=1):
+        self.array, self.device = array, device
+        self.shape, self.dtype = array.shape, "another library's"
+
+    def __dlpack__(self, stream=None):
+        return self.array.__dlpack__()
+
+    def __dlpack_device__(self):
+        return self.device, 0
+
+    def __getitem__(self, index):
+        raise AssertionError("it was not taken in place")
+
+
+def test_memory_of_other_libraries_is_read_in_place():
+    field = ball()
+    assert same(isobrick.extract(Exchanged(field), 1), isobrick.extract(field, 1))
+    with pytest.raises(TypeError, match="device"):
+        isobrick.extract(Exchanged(field, device=2), 1)
+
+
+def test_arrays_become_stores_by_blocks(tmp_path):
+    da = pytest.importorskip("dask.array")
+    field = ball((100, 90, 80), 30)
+    report = isobrick.convert(da.from_array(field, chunks=40), tmp_path / "a.zarr", spacing=(1, 2, 3))
+    assert report["bytes_in"] == field.nbytes
+    volume = isobrick.open(tmp_path / "a.zarr")
+    assert np.array_equal(volume.read(), field) and volume.spacing == (1, 2, 3)
+    array = Recorded(field)
+    isobrick.convert(array, tmp_path / "b.zarr", brick=16, memory="64M")
+    assert np.array_equal(isobrick.open(tmp_path / "b.zarr").read(), field)
+    assert array.largest < field.size
