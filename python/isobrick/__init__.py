@@ -44,3 +44,9 @@ __all__ = [
     "synth",
     "verify",
 ]
+
+# Messages and help() name things as programs do.
+for _thing in (globals()[_name] for _name in __all__):
+    if hasattr(_thing, "__module__"):
+        _thing.__module__ = __name__
+del _thing
