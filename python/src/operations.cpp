@@ -114,8 +114,11 @@ py::dict verify_store(const std::string& path, const VolumeRequest& request,
 }
 
 py::dict describe_path(const std::string& path, const VolumeRequest& request) {
-  if (is_zarr(path)) return describe(StoreReader(path, request.selection).info());
-  return describe(open_source(path, request)->info());
+  if (is_zarr(path))
+    return describe(interruptible(
+        py::none(), [&](Reporter) { return StoreReader(path, request.selection).info(); }));
+  return describe(
+      interruptible(py::none(), [&](Reporter) { return open_source(path, request)->info(); }));
 }
 
 std::unique_ptr<VolumeSource> synth_source(const std::string& kind, Int3 extent, ScalarType type,
