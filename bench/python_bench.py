@@ -35,7 +35,7 @@ def compare(name, volume, level, repeats):
     }
     result = []
     for row, work in rows.items():
-        seconds, mesh = seconds_of(work, 1 if row.startswith("skimage") else repeats)
+        seconds, mesh = seconds_of(work, 3 if row.startswith("skimage") else repeats)
         triangles = len(mesh[1]) if isinstance(mesh, tuple) else len(mesh)
         times = result[0]["seconds"] / seconds if result else 1
         result.append({"volume": name, "what": row, "seconds": seconds, "triangles": triangles,

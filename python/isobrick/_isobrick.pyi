@@ -67,7 +67,6 @@ class ConvertOptions:
     shard: Optional[int]
     zstd_level: Optional[int]
     levels: Optional[int]
-    factors: list[Zyx]
     memory: int
     threads: int
     resume: bool

@@ -32,7 +32,6 @@ void bind_convert_options(py::module_& module) {
       .def_readwrite("shard", &ConvertOptions::shard)
       .def_readwrite("zstd_level", &ConvertOptions::zstd_level)
       .def_readwrite("levels", &ConvertOptions::levels)
-      .def_readwrite("factors", &ConvertOptions::factors)
       .def_readwrite("memory", &ConvertOptions::memory)
       .def_readwrite("threads", &ConvertOptions::threads)
       .def_readwrite("resume", &ConvertOptions::resume)
