@@ -34,6 +34,7 @@ class ExtractOptions:
     normals: bool
     drop_degenerate: bool
     memory: int
+    memory_of_others: int
     threads: int
     backend: Backend
     gpu_memory: int
@@ -166,6 +167,7 @@ def convert_function(
     read: Callable[[Zyx, Zyx], np.ndarray],
     extent: Zyx,
     type: str,
+    memory: int,
     transform: Transform,
     out: str,
     options: ConvertOptions,

@@ -61,24 +61,25 @@ py::dict convert_file(const std::string& path, const std::string& out, const Vol
   }));
 }
 
-py::dict convert_volume(Volume volume, const Transform& transform, const std::string& out,
-                        const ConvertOptions& options, const py::object& callback) {
+py::dict convert_volume(Volume volume, std::size_t memory, const Transform& transform,
+                        const std::string& out, const ConvertOptions& options,
+                        const py::object& callback) {
   volume.transform = transform;
   return describe(interruptible(callback, [&](Reporter reporter) {
-    ArraySource source(volume, "array");
+    ArraySource source(volume, "array", memory);
     return convert(source, out, options, reporter.progress);
   }));
 }
 
 py::dict convert_array(const py::array& array, const Transform& transform, const std::string& out,
                        const ConvertOptions& options, const py::object& callback) {
-  return convert_volume(volume_of(array), transform, out, options, callback);
+  return convert_volume(volume_of(array), 0, transform, out, options, callback);
 }
 
-py::dict convert_function(const py::object& read, Int3 extent, ScalarType type,
+py::dict convert_function(const py::object& read, Int3 extent, ScalarType type, std::size_t memory,
                           const Transform& transform, const std::string& out,
                           const ConvertOptions& options, const py::object& callback) {
-  return convert_volume(volume_of(read, extent, type), transform, out, options, callback);
+  return convert_volume(volume_of(read, extent, type), memory, transform, out, options, callback);
 }
 
 py::dict index_store(const std::string& path, const std::string& kind, Index leaf,
