@@ -6,7 +6,6 @@ from collections import OrderedDict
 
 import numpy as np
 
-
 # Fewer chunks than the corners of a box touch are of no use.
 _LEAST_ROOM = 8
 
@@ -68,12 +67,12 @@ class BlockReader:
         for i in range(0, len(chunks), self.room // 2):
             some = chunks[i : i + self.room // 2]
             missing = [chunk for chunk in some if chunk not in self.kept]
+            for chunk in set(some).difference(missing):
+                self.kept.move_to_end(chunk)
+            while len(self.kept) + len(missing) > self.room:
+                self.kept.popitem(last=False)
             for chunk, samples in zip(missing, self._read([self._slices(c) for c in missing])):
                 self.kept[chunk] = samples
-            for chunk in some:
-                self.kept.move_to_end(chunk)
-            while len(self.kept) > self.room:
-                self.kept.popitem(last=False)
             for chunk in some:
                 yield chunk, self.kept[chunk]
 
