@@ -1,5 +1,9 @@
 """marching_cubes() beside that of scikit-image, on its own examples."""
 
+import shutil
+import subprocess
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -106,6 +110,18 @@ def test_types_and_methods(ellipsoid, dtype, method):
     volume = (ellipsoid > 0) if dtype == "?" else (ellipsoid * 20 + 40).clip(0, 100).astype(dtype)
     level = 0.5 if dtype == "?" else 40.5
     assert_alike(*both(volume, level, method=method), tolerance=0.02)
+
+
+def test_a_real_volume():
+    if not shutil.which("zstd"):
+        pytest.skip("no zstd")
+    file = Path(__file__).resolve().parents[2] / "data/headsq_quarter_64x64x93_int16.raw.zst"
+    data = subprocess.run(["zstd", "-dqc", file], check=True, capture_output=True).stdout
+    head = np.frombuffer(data, np.int16).reshape(93, 64, 64)
+    ours = isobrick.marching_cubes(head, 500.5, spacing=(1.5, 3.2, 3.2))
+    theirs = measure.marching_cubes(head.copy(), 500.5, spacing=(1.5, 3.2, 3.2))
+    assert_alike(ours, theirs)
+    assert len(ours[0]) == pytest.approx(len(theirs[0]), rel=0.01)
 
 
 def test_the_default_level_and_strides(ellipsoid):
