@@ -1,7 +1,7 @@
 # cmake -D CLANG_FORMAT=… -D ROOT=… -P check_format.cmake
 # Names every place in our sources that clang-format would lay out differently.
 set(files)
-foreach(folder include core io bricks index surface gpu stream pipeline viewer tools tests bench)
+foreach(folder include core io bricks index surface gpu stream pipeline viewer python tools tests bench)
   foreach(extension h cpp cu cuh inc)
     file(GLOB_RECURSE found ${ROOT}/${folder}/*.${extension})
     list(FILTER found EXCLUDE REGEX /node_modules/)

@@ -164,7 +164,8 @@ TEST_F(Setup, ElsewhereItNamesTheCommandThatInstalls) {
                              " fmt-devel cli11-devel isa-l-devel highway-devel gtest-devel\n"),
             std::string::npos)
       << outcome.err;
-  EXPECT_NE(outcome.err.find("pictures and tests: dnf install blosc-devel"), std::string::npos)
+  EXPECT_NE(outcome.err.find("pictures, Python and tests: dnf install blosc-devel"),
+            std::string::npos)
       << outcome.err;
   EXPECT_NE(outcome.err.find("(Debian's names): libimgui-dev"), std::string::npos) << outcome.err;
   EXPECT_EQ(log(), "");

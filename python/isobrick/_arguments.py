@@ -1,0 +1,167 @@
+"""Checks and conversions of arguments that several functions take."""
+
+import math
+import operator
+import os
+
+from . import _isobrick
+from ._errors import UsageError
+
+_UNITS = {"": 1, "k": 2**10, "m": 2**20, "g": 2**30, "t": 2**40}
+
+
+def integer(value, name):
+    try:
+        return operator.index(value)
+    except TypeError:
+        raise TypeError(f"{name} must be an integer, not {type(value).__name__}") from None
+
+
+def number(value, name):
+    """A float that is not NaN."""
+    try:
+        result = float(value)
+    except (TypeError, ValueError):
+        raise TypeError(f"{name} must be a number, not {value!r}") from None
+    if math.isnan(result):
+        raise UsageError(f"{name} is not a number (NaN)")
+    return result
+
+
+def numbers(values, count, name):
+    """A tuple of so many floats."""
+    try:
+        result = tuple(float(value) for value in values)
+    except (TypeError, ValueError):
+        raise TypeError(f"{name} must be {count} numbers, not {values!r}") from None
+    if len(result) != count:
+        raise UsageError(f"{name} must be {count} numbers, not {len(result)}")
+    if not all(map(math.isfinite, result)):
+        raise UsageError(f"{name} must be finite, not {result}")
+    return result
+
+
+def integers(values, name):
+    """A tuple of three integers."""
+    try:
+        result = tuple(operator.index(value) for value in values)
+    except TypeError:
+        raise TypeError(f"{name} must be three integers [z, y, x], not {values!r}") from None
+    if len(result) != 3:
+        raise UsageError(f"{name} must be three integers [z, y, x], not {len(result)}")
+    return result
+
+
+def byte_count(value, name="memory"):
+    """Bytes, from a number or a text such as "512M"."""
+    if isinstance(value, str):
+        text = value.strip().lower().removesuffix("ib").removesuffix("b")
+        digits, unit = (text[:-1], text[-1]) if text[-1:] in _UNITS else (text, "")
+        try:
+            value = int(float(digits) * _UNITS[unit])
+        except (ValueError, KeyError, OverflowError):
+            raise UsageError(f'{name} must be bytes such as 2**30 or "1G", not {value!r}') from None
+    value = integer(value, name)
+    if not 0 < value < 2**63:
+        raise UsageError(f"{name} must be a positive number of bytes, not {value}")
+    return value
+
+
+def thread_count(value):
+    value = integer(value, "threads")
+    if not 0 <= value <= 4096:
+        raise UsageError(f"threads must be 0 (all cores) to 4096, not {value}")
+    return value
+
+
+def path_text(path):
+    text = os.fspath(path)
+    return os.fsdecode(text)
+
+
+def transform(spacing=None, origin=None, direction=None, unit=""):
+    """The place of the samples in world space."""
+    result = _isobrick.Transform()
+    if spacing is not None:
+        result.spacing = numbers(spacing, 3, "spacing")
+        if min(result.spacing) <= 0:
+            raise UsageError(f"spacing must be positive, not {result.spacing}")
+    if origin is not None:
+        result.origin = numbers(origin, 3, "origin")
+    if direction is not None:
+        rows = [value for row in direction for value in (row if hasattr(row, "__iter__") else [row])]
+        result.direction = numbers(rows, 9, "direction")
+        check_rotation(result.direction)
+    if unit:
+        if not isinstance(unit, str):
+            raise TypeError(f"unit must be a text such as 'mm', not {unit!r}")
+        result.unit = _isobrick.unit_name(unit)
+        if not result.unit:
+            raise UsageError(f"{unit!r} is no unit of length; those are {_isobrick.unit_names()}")
+    return result
+
+
+def check_rotation(m):
+    columns = [m[0::3], m[1::3], m[2::3]]
+    for i in range(3):
+        for j in range(i, 3):
+            dot = sum(a * b for a, b in zip(columns[i], columns[j]))
+            if abs(dot - (i == j)) > 1e-3:
+                raise UsageError("direction must be a rotation: its columns are not orthonormal")
+
+
+def slices_of(roi):
+    """Three slices [z, y, x] without steps."""
+    if isinstance(roi, slice) or not hasattr(roi, "__len__"):
+        roi = (roi,)
+    if len(roi) > 3 or not all(isinstance(part, slice) for part in roi):
+        raise TypeError(f"roi must be slices [z, y, x] such as numpy.s_[0:10, :, 5:], not {roi!r}")
+    if any(part.step not in (None, 1) for part in roi):
+        raise UsageError("roi takes slices without a step")
+    return tuple(roi) + (slice(None),) * (3 - len(roi))
+
+
+def box_of(roi, shape):
+    """((z, y, x), (z, y, x)) from three slices, within the shape; None for None."""
+    if roi is None:
+        return None
+    lo, hi = [], []
+    for part, size in zip(slices_of(roi), shape):
+        begin, end, _ = part.indices(size)
+        lo.append(begin)
+        hi.append(end)
+    if any(end <= begin for begin, end in zip(lo, hi)):
+        raise UsageError(f"roi {roi} has no samples in an array of shape {tuple(shape)}")
+    return tuple(lo), tuple(hi)
+
+
+def extract_options(
+    isovalue, *, box=None, level=0, normals=False, inside=None, drop_degenerate=False,
+    memory=2**30, threads=0, backend="auto", gpu_memory=0, device=0,
+):
+    options = _isobrick.ExtractOptions()
+    options.isovalue = number(isovalue, "isovalue")
+    options.roi = box
+    options.level = integer(level, "level")
+    options.normals = bool(normals)
+    if inside not in (None, "above", "below"):
+        raise UsageError(f"inside must be 'above', 'below' or None, not {inside!r}")
+    options.inside = None if inside is None else getattr(_isobrick.Inside, inside)
+    options.drop_degenerate = bool(drop_degenerate)
+    options.memory = byte_count(memory)
+    options.threads = thread_count(threads)
+    if backend not in ("auto", "cpu", "cuda"):
+        raise UsageError(f"backend must be 'auto', 'cpu' or 'cuda', not {backend!r}")
+    options.backend = getattr(_isobrick.Backend, backend)
+    options.gpu_memory = byte_count(gpu_memory, "gpu_memory") if gpu_memory else 0
+    options.device = integer(device, "device")
+    return options
+
+
+def mesh_file_options(*, force=False, quantize=False, threads=0, memory=2**30):
+    options = _isobrick.MeshFileOptions()
+    options.force = bool(force)
+    options.quantize = bool(quantize)
+    options.threads = thread_count(threads)
+    options.memory = byte_count(memory)
+    return options

@@ -1,0 +1,155 @@
+"""Surfaces of arrays."""
+
+from ._arguments import box_of, extract_options, mesh_file_options, number, path_text
+from ._errors import UsageError
+from ._mesh import Mesh
+from ._progress import reporting
+from ._samples import Samples
+
+
+class Extractor:
+    """Isosurfaces of one array, for several isovalues.
+
+    The first extraction finds the ranges of blocks of samples, and later ones skip what their
+    isovalue does not touch. The mesh is the same as that of `isobrick.extract`.
+
+    Parameters
+    ----------
+    array : array [z, y, x]
+        Samples of uint8, int8, uint16, int16, uint32, int32, float32, float64 or bool. A NumPy
+        array is read in place, whatever its strides, and must stay as it is while it is used.
+        Anything else with `shape`, `dtype` and `__getitem__` (dask, zarr, h5py) is read by blocks,
+        never as a whole. A `xarray.DataArray` gives spacing, origin and unit by its coordinates.
+    spacing, origin : three floats x, y, z, optional
+        Distance between samples, and the place of sample [0, 0, 0], in world space.
+    direction : 3×3 floats, optional
+        A rotation. Its columns are the world directions of the index axes x, y, z.
+    unit : str, optional
+        Of world space, such as "mm".
+    mask : array [z, y, x] of bool, optional
+        Where it is False the sample is missing. No surface touches missing samples.
+    nodata : float, optional
+        Samples of this value are missing.
+
+    Arrays and all that indexes them (`shape`, `roi`) are in the order z, y, x. World space
+    (`spacing`, `origin`, vertices) is in the order x, y, z, as in VTK, SimpleITK and nibabel.
+    """
+
+    def __init__(
+        self, array, *, spacing=None, origin=None, direction=None, unit=None, mask=None, nodata=None
+    ):
+        samples = Samples(
+            array, spacing=spacing, origin=origin, direction=direction, unit=unit, mask=mask
+        )
+        nodata = None if nodata is None else number(nodata, "nodata")
+        self._samples = samples
+        self._native = samples.extractor(nodata)
+
+    @property
+    def shape(self):
+        """Samples along z, y, x."""
+        return self._samples.shape
+
+    @property
+    def dtype(self):
+        """The NumPy dtype of the samples."""
+        return self._samples.dtype
+
+    @property
+    def range(self):
+        """(smallest, largest) sample, missing ones left out; None before the first extraction."""
+        return self._native.range
+
+    def extract(
+        self, isovalue, *, roi=None, normals=False, inside="above", drop_degenerate=False,
+        memory=2**30, threads=0, progress=None,
+    ):
+        """The surface of an isovalue as a `Mesh`.
+
+        Parameters
+        ----------
+        isovalue : float
+            In the values of the samples.
+        roi : slices [z, y, x], optional
+            Only these samples, such as `numpy.s_[0:10, :, 5:]`.
+        normals : bool
+            Adds normals, from the gradient of the samples.
+        inside : "above" or "below"
+            Which samples are inside: those of at least the isovalue, or those less than it.
+        drop_degenerate : bool
+            Leaves triangles without area out.
+        memory : int or str
+            Budget in bytes, or a text such as "512M", for all but the array and the mesh.
+        threads : int
+            0: all cores.
+        progress : function or tqdm, optional
+            A function of (stage, done, total) in bytes, a tqdm bar, or the class `tqdm`.
+
+        Raises UsageError (a ValueError) for a request that makes no sense.
+        """
+        options = self._options(
+            isovalue, roi, normals, inside, drop_degenerate, memory, threads
+        )
+        with reporting(progress) as report:
+            return Mesh._of(self._native.extract(options, report))
+
+    def save(
+        self, path, isovalue, *, roi=None, normals=False, inside="above", drop_degenerate=False,
+        memory=2**30, threads=0, progress=None, force=False, quantize=False,
+    ):
+        """Streams a surface to a mesh file, so that the mesh may be larger than memory.
+
+        The arguments are those of `extract` and of `Mesh.save`. Returns the numbers of vertices
+        and faces in a dictionary.
+        """
+        options = self._options(
+            isovalue, roi, normals, inside, drop_degenerate, memory, threads
+        )
+        file = mesh_file_options(force=force, quantize=quantize, threads=threads, memory=memory)
+        with reporting(progress) as report:
+            return self._native.save(options, path_text(path), file, report)
+
+    def _options(self, isovalue, roi, normals, inside, drop_degenerate, memory, threads):
+        if isinstance(isovalue, str):
+            raise UsageError(
+                f"the isovalue of an array must be a number, not {isovalue!r}; "
+                "isobrick.open takes texts such as 'otsu'"
+            )
+        options = extract_options(
+            isovalue, box=box_of(roi, self.shape), normals=normals, inside=inside,
+            drop_degenerate=drop_degenerate, memory=memory, threads=threads,
+        )
+        options.memory_of_others = self._samples.set_memory(options.memory)
+        return options
+
+
+def extract(
+    array, isovalue, *, spacing=None, origin=None, direction=None, unit=None, mask=None,
+    nodata=None, roi=None, normals=False, inside="above", drop_degenerate=False, memory=2**30,
+    threads=0, progress=None,
+):
+    """The isosurface of an array [z, y, x] as a `Mesh`.
+
+    Parameters
+    ----------
+    array, spacing, origin, direction, unit, mask, nodata
+        As of `Extractor`: arrays are indexed [z, y, x]; world space is x, y, z.
+    isovalue, roi, normals, inside, drop_degenerate, memory, threads, progress
+        As of `Extractor.extract`.
+
+    Examples
+    --------
+    >>> import numpy as np, isobrick
+    >>> z, y, x = np.mgrid[-1:1:64j, -1:1:64j, -1:1:64j]
+    >>> ball = isobrick.extract(1 - np.sqrt(x**2 + y**2 + z**2), 0.5)
+    >>> ball.faces.shape[1], ball.vertices.dtype
+    (3, dtype('float32'))
+    """
+    extractor = Extractor(
+        array, spacing=spacing, origin=origin, direction=direction, unit=unit, mask=mask,
+        nodata=nodata,
+    )
+    return extractor.extract(
+        isovalue, roi=roi, normals=normals, inside=inside, drop_degenerate=drop_degenerate,
+        memory=memory, threads=threads, progress=progress,
+    )

@@ -1,0 +1,202 @@
+"""The bindings in C++. The package isobrick checks arguments and is what programs use."""
+
+from typing import Any, Callable, Optional
+
+import numpy as np
+from numpy.typing import NDArray
+
+Zyx = tuple[int, int, int]
+Xyz = tuple[float, float, float]
+Box = tuple[Zyx, Zyx]
+Report = Optional[Callable[[str, int, int], object]]
+
+__version__: str
+
+class Transform:
+    spacing: Xyz
+    origin: Xyz
+    direction: Any
+    unit: str
+
+class Inside:
+    above: Inside
+    below: Inside
+
+class Backend:
+    cpu: Backend
+    cuda: Backend
+
+class ExtractOptions:
+    isovalue: float
+    level: int
+    roi: Optional[Box]
+    inside: Optional[Inside]
+    normals: bool
+    drop_degenerate: bool
+    memory: int
+    memory_of_others: int
+    threads: int
+    backend: Backend
+    gpu_memory: int
+    device: int
+
+class MeshFileOptions:
+    quantize: bool
+    force: bool
+    threads: int
+    memory: int
+
+class VolumeRequest:
+    extent: Optional[Zyx]
+    type: Optional[str]
+    big_endian: bool
+    offset: Optional[int]
+    spacing: Optional[Xyz]
+    origin: Optional[Xyz]
+    unit: Optional[str]
+    grid: Optional[str]
+    stride: Zyx
+    nodata: Optional[float]
+    memory: Optional[int]
+    threads: int
+    channel: Optional[int]
+    time: Optional[int]
+    def set_roi(self, lo: list[Optional[int]], hi: list[Optional[int]]) -> None: ...
+
+class ConvertOptions:
+    brick: Optional[int]
+    shard: Optional[int]
+    zstd_level: Optional[int]
+    levels: Optional[int]
+    memory: int
+    threads: int
+    resume: bool
+    force: bool
+    leaf: int
+    ome_04: bool
+    def set_downsampling(self, name: str) -> bool: ...
+    def set_index(self, name: str) -> bool: ...
+
+class Mesh:
+    unit: str
+    def __init__(
+        self,
+        vertices: NDArray[np.float32],
+        faces: NDArray[np.uint32],
+        normals: Optional[NDArray[np.float32]],
+        unit: str,
+    ) -> None: ...
+    @property
+    def vertices(self) -> NDArray[np.float32]: ...
+    @property
+    def normals(self) -> NDArray[np.float32]: ...
+    @property
+    def faces(self) -> NDArray[np.uint32]: ...
+    def save(self, path: str, options: MeshFileOptions) -> None: ...
+
+class ArrayExtractor:
+    @staticmethod
+    def of_array(
+        samples: np.ndarray,
+        transform: Transform,
+        nodata: Optional[float],
+        mask: Optional[np.ndarray],
+    ) -> ArrayExtractor: ...
+    @staticmethod
+    def of_function(
+        read: Callable[[Zyx, Zyx], np.ndarray],
+        extent: Zyx,
+        type: str,
+        transform: Transform,
+        nodata: Optional[float],
+        mask: Optional[np.ndarray],
+    ) -> ArrayExtractor: ...
+    def extract(self, options: ExtractOptions, report: Report) -> Mesh: ...
+    def save(
+        self, options: ExtractOptions, path: str, file: MeshFileOptions, report: Report
+    ) -> dict[str, Any]: ...
+    @property
+    def range(self) -> Optional[tuple[float, float]]: ...
+
+class Store:
+    @property
+    def info(self) -> dict[str, Any]: ...
+    @property
+    def notes(self) -> list[str]: ...
+    @property
+    def range(self) -> Optional[tuple[float, float]]: ...
+    def extract(self, options: ExtractOptions, report: Report) -> Mesh: ...
+    def save_mesh(
+        self, options: ExtractOptions, path: str, file: MeshFileOptions, report: Report
+    ) -> dict[str, Any]: ...
+    def estimate(self, options: ExtractOptions) -> dict[str, Any]: ...
+    def read(self, level: int, box: Box, threads: int) -> np.ndarray: ...
+    def histogram(self, bins: int, report: Report) -> dict[str, Any]: ...
+    def isovalues(self, text: str, report: Report) -> list[float]: ...
+    def suggested_isovalue(self, report: Report) -> Optional[tuple[float, str]]: ...
+    def export(
+        self,
+        path: str,
+        format: str,
+        part: ExtractOptions,
+        isovalue: Optional[float],
+        half_band: int,
+        force: bool,
+        report: Report,
+    ) -> None: ...
+
+def open(
+    path: str,
+    request: VolumeRequest,
+    cache: str,
+    cache_limit: int,
+    memory: int,
+    threads: int,
+    report: Report,
+) -> Store: ...
+def default_cache_folder() -> str: ...
+def unit_name(unit: str) -> str: ...
+def unit_names() -> str: ...
+def convert_file(
+    path: str, out: str, request: VolumeRequest, options: ConvertOptions, report: Report
+) -> dict[str, Any]: ...
+def convert_array(
+    array: np.ndarray, transform: Transform, out: str, options: ConvertOptions, report: Report
+) -> dict[str, Any]: ...
+def convert_function(
+    read: Callable[[Zyx, Zyx], np.ndarray],
+    extent: Zyx,
+    type: str,
+    memory: int,
+    transform: Transform,
+    out: str,
+    options: ConvertOptions,
+    report: Report,
+) -> dict[str, Any]: ...
+def index(
+    path: str,
+    kind: str,
+    leaf: int,
+    request: VolumeRequest,
+    resume: bool,
+    force: bool,
+    report: Report,
+) -> dict[str, Any]: ...
+def verify(path: str, request: VolumeRequest, report: Report) -> dict[str, Any]: ...
+def describe(path: str, request: VolumeRequest) -> dict[str, Any]: ...
+def synth_array(
+    kind: str, shape: Zyx, dtype: str, seed: int, frequency: Optional[float], noise: float
+) -> np.ndarray: ...
+def synth_store(
+    out: str,
+    kind: str,
+    shape: Zyx,
+    dtype: str,
+    seed: int,
+    frequency: Optional[float],
+    noise: float,
+    options: ConvertOptions,
+    report: Report,
+) -> dict[str, Any]: ...
+def vertex_ranges(mesh: Mesh, samples: np.ndarray) -> NDArray[np.float32]: ...
+def keep_cells(mesh: Mesh, mask: np.ndarray) -> None: ...

@@ -1,0 +1,141 @@
+"""Meshes in memory."""
+
+import numpy as np
+
+from . import _isobrick
+from ._arguments import mesh_file_options, path_text
+
+
+class Mesh:
+    """A triangle mesh in memory, as NumPy arrays without copies.
+
+    `Mesh(vertices, faces, normals=None, unit="")` copies arrays of others.
+
+    Attributes
+    ----------
+    vertices : (N, 3) float32
+        Positions x, y, z in world space, in `unit`.
+    normals : (N, 3) float32 or None
+        Unit vectors x, y, z from the inside out, where normals were requested.
+    faces : (M, 3) uint32
+        Numbers of vertices, counter-clockwise seen from outside.
+    unit : str
+        Of the vertices, such as "millimeter"; empty where it is not known.
+
+    The arrays lie in the memory of the mesh and keep it alive. They can be changed, and
+    other libraries take them without copies (`__dlpack__`, `__array_interface__`).
+    """
+
+    __slots__ = ("_native",)
+
+    def __init__(self, vertices, faces, normals=None, *, unit=""):
+        faces = np.asarray(faces)
+        if faces.size and (faces.dtype.kind not in "ui" or faces.min() < 0):
+            raise TypeError("faces must be numbers of vertices, integers of at least 0")
+        if faces.size and int(faces.max()) >= len(vertices):
+            raise ValueError(f"a face names vertex {faces.max()}, of {len(vertices)} vertices")
+        self._native = _isobrick.Mesh(
+            np.ascontiguousarray(vertices, np.float32),
+            np.ascontiguousarray(faces, np.uint32),
+            None if normals is None else np.ascontiguousarray(normals, np.float32),
+            unit,
+        )
+
+    @classmethod
+    def _of(cls, native):
+        mesh = cls.__new__(cls)
+        mesh._native = native
+        return mesh
+
+    @property
+    def vertices(self):
+        """Positions (N, 3) float32, x, y, z in world space."""
+        return self._native.vertices
+
+    @property
+    def normals(self):
+        """Unit vectors (N, 3) float32 from the inside out, or None."""
+        normals = self._native.normals
+        return normals if len(normals) or not len(self._native.vertices) else None
+
+    @property
+    def faces(self):
+        """Triangles (M, 3) uint32, counter-clockwise seen from outside."""
+        return self._native.faces
+
+    @property
+    def unit(self):
+        """The unit of the vertices, such as "millimeter", or ""."""
+        return self._native.unit
+
+    def __len__(self):
+        """The number of triangles."""
+        return len(self.faces)
+
+    def __repr__(self):
+        parts = [f"{len(self.vertices):,} vertices", f"{len(self.faces):,} triangles"]
+        if self.normals is not None and len(self.vertices):
+            parts.append("normals")
+        if self.unit:
+            parts.append(f"in {self.unit}s")
+        return f"<isobrick.Mesh: {', '.join(parts)}>"
+
+    def save(self, path, *, force=False, quantize=False):
+        """Writes a mesh file.
+
+        Parameters
+        ----------
+        path : str or path
+            The extension is the format: .ply, .stl, .obj, .glb, .vtp or .pvtp.
+        force : bool
+            Replaces a file that exists; otherwise that is a UsageError.
+        quantize : bool
+            GLB only: 16 bits a coordinate.
+
+        The file has its name once it is whole.
+        """
+        self._native.save(path_text(path), mesh_file_options(force=force, quantize=quantize))
+
+    def to_trimesh(self):
+        """A `trimesh.Trimesh` of the same vertices and faces."""
+        import trimesh
+
+        return trimesh.Trimesh(
+            self.vertices, self.faces, vertex_normals=self.normals, process=False
+        )
+
+    def to_vtk(self):
+        """A `vtkPolyData`; it shares the vertices and the normals, and copies the faces."""
+        from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray
+        from vtkmodules.vtkCommonCore import vtkPoints
+        from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData
+
+        data = vtkPolyData()
+        points = vtkPoints()
+        points.SetData(numpy_to_vtk(self.vertices))
+        data.SetPoints(points)
+        cells = vtkCellArray()
+        offsets = np.arange(0, 3 * len(self.faces) + 1, 3, dtype=np.int64)
+        connectivity = self.faces.astype(np.int64).ravel()
+        cells.SetData(
+            numpy_to_vtkIdTypeArray(offsets, deep=1), numpy_to_vtkIdTypeArray(connectivity, deep=1)
+        )
+        data.SetPolys(cells)
+        if self.normals is not None and len(self.vertices):
+            normals = numpy_to_vtk(self.normals)
+            normals.SetName("Normals")
+            data.GetPointData().SetNormals(normals)
+        return data
+
+    def to_pyvista(self):
+        """A `pyvista.PolyData` of `to_vtk()`."""
+        import pyvista
+
+        return pyvista.PolyData(self.to_vtk())
+
+    def to_meshio(self):
+        """A `meshio.Mesh` of the same vertices and faces."""
+        import meshio
+
+        data = {} if self.normals is None else {"normals": self.normals}
+        return meshio.Mesh(self.vertices, [("triangle", self.faces)], point_data=data)

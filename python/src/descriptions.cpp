@@ -1,0 +1,70 @@
+#include "python/src/descriptions.h"
+
+#include <string>
+
+#include "python/src/casters.h"
+
+namespace isobrick::python {
+namespace {
+
+namespace py = pybind11;
+
+void add_transform(py::dict& to, const Transform& transform) {
+  to["spacing"] = transform.spacing;
+  to["origin"] = transform.origin;
+  to["direction"] = transform.direction;
+  to["unit"] = transform.unit;
+}
+
+py::dict describe_level(const LevelInfo& level) {
+  py::dict dict;
+  dict["shape"] = level.lattice.extent;
+  add_transform(dict, level.transform);
+  dict["brick"] = level.lattice.brick;
+  dict["shard"] = level.shard;
+  return dict;
+}
+
+}  // namespace
+
+py::dict describe(const StoreInfo& info) {
+  py::list levels;
+  for (const LevelInfo& level : info.levels) levels.append(describe_level(level));
+  py::dict dict;
+  dict["path"] = info.path.string();
+  dict["shape"] = info.levels.front().lattice.extent;
+  dict["dtype"] = info.type;
+  add_transform(dict, info.levels.front().transform);
+  dict["levels"] = levels;
+  dict["codec"] = info.codec;
+  dict["fill_value"] = info.fill_value;
+  dict["grid_class"] = info.grid_class;
+  dict["grid_name"] = info.grid_name;
+  dict["is_store"] = info.ours;
+  return dict;
+}
+
+py::dict describe(const VolumeInfo& info) {
+  py::dict dict;
+  dict["path"] = info.name;
+  dict["shape"] = info.extent;
+  dict["dtype"] = info.type;
+  add_transform(dict, info.transform);
+  dict["levels"] = py::list();
+  dict["codec"] = py::none();
+  dict["fill_value"] = info.fill_value;
+  dict["grid_class"] = info.grid_class;
+  dict["grid_name"] = info.grid_name;
+  dict["is_store"] = false;
+  return dict;
+}
+
+py::dict describe(const ConvertReport& report) {
+  return py::dict(py::arg("bytes_in") = report.bytes_in, py::arg("bytes_out") = report.bytes_out,
+                  py::arg("levels") = report.levels, py::arg("bricks") = report.bricks,
+                  py::arg("bricks_absent") = report.bricks_absent,
+                  py::arg("bricks_kept") = report.bricks_kept,
+                  py::arg("index_bytes") = report.index_bytes, py::arg("seconds") = report.seconds);
+}
+
+}  // namespace isobrick::python

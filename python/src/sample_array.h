@@ -1,0 +1,27 @@
+#pragma once
+
+#include <pybind11/numpy.h>
+
+#include <optional>
+
+#include <isobrick/scalar.h>
+#include <isobrick/volume.h>
+
+namespace isobrick::python {
+
+/// The type of an array's samples; nullopt for one that is none of the eight, or of another byte
+/// order than this machine's.
+std::optional<ScalarType> scalar_type(const pybind11::array& array);
+
+/// The samples of an array [z, y, x] where they lie; the array must outlive the volume. Throws
+/// UsageError for an array that is no volume.
+Volume volume_of(const pybind11::array& array);
+/// The same with samples taken for those of another type of their size.
+Volume volume_of(const pybind11::array& array, ScalarType type);
+
+/// Samples that a Python function reads: read(lo, hi), both (z, y, x), returns a new array [z, y,
+/// x] of `type` in C order. It is called with the GIL, from one thread at a time. The volume keeps
+/// the function alive. What it raises ends the operation.
+Volume volume_of(const pybind11::object& read, Int3 extent, ScalarType type);
+
+}  // namespace isobrick::python

@@ -1,0 +1,195 @@
+#include <isobrick/open_volume.h>
+
+#include <pybind11/numpy.h>
+
+#include <algorithm>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include <isobrick/error.h>
+#include <isobrick/estimate.h>
+#include <isobrick/export.h>
+#include <isobrick/extract.h>
+#include <isobrick/isovalue.h>
+#include <isobrick/mesh_file_sink.h>
+#include "pipeline/slab_reader.h"
+#include "pipeline/workers.h"
+#include "python/src/bindings.h"
+#include "python/src/casters.h"
+#include "python/src/descriptions.h"
+#include "python/src/interruptible.h"
+
+namespace isobrick::python {
+namespace {
+
+const LevelInfo& level_of(const StoreReader& store, int level) {
+  const auto& levels = store.info().levels;
+  if (level < 0 || static_cast<std::size_t>(level) >= levels.size())
+    throw UsageError(
+        fmt::format("there is no level {}; the levels are 0 to {}", level, levels.size() - 1));
+  return levels[static_cast<std::size_t>(level)];
+}
+
+std::unique_ptr<OpenedVolume> open_volume(const std::string& path, const VolumeRequest& request,
+                                          const std::string& cache, std::uint64_t cache_limit,
+                                          std::uint64_t memory, int threads,
+                                          const py::object& callback) {
+  const OpenOptions options{
+      .volume = request, .cache = {cache, cache_limit}, .memory = memory, .threads = threads};
+  return interruptible(callback, [&](Reporter reporter) {
+    return std::make_unique<OpenedVolume>(path, options, reporter.progress);
+  });
+}
+
+std::unique_ptr<Mesh> extract_mesh(const OpenedVolume& volume, ExtractOptions options,
+                                   const py::object& callback) {
+  return interruptible(callback, [&](Reporter reporter) {
+    options.cancel = reporter.cancel;
+    return std::make_unique<Mesh>(extract(volume.store(), options, reporter.progress));
+  });
+}
+
+py::dict save_mesh(const OpenedVolume& volume, ExtractOptions options, const std::string& path,
+                   const MeshFileOptions& file, const py::object& callback) {
+  const ExtractReport report = interruptible(callback, [&](Reporter reporter) {
+    options.cancel = reporter.cancel;
+    const auto sink = create_mesh_file(path, file);
+    return extract(volume.store(), options, *sink, reporter.progress);
+  });
+  return py::dict(py::arg("vertices") = report.vertices, py::arg("faces") = report.triangles,
+                  py::arg("bricks") = report.bricks, py::arg("bricks_read") = report.bricks_read,
+                  py::arg("bytes_read") = report.bytes_read, py::arg("backend") = report.backend,
+                  py::arg("seconds") = report.seconds);
+}
+
+py::dict estimate_mesh(const OpenedVolume& volume, const ExtractOptions& options) {
+  const ExtractEstimate guess = interruptible(
+      py::none(), [&](Reporter) { return estimate(volume.store(), options, std::uint64_t{0}); });
+  return py::dict(py::arg("vertices") = guess.mesh.vertices,
+                  py::arg("faces") = guess.mesh.triangles,
+                  py::arg("uncertainty") = guess.uncertainty);
+}
+
+py::array read_samples(const OpenedVolume& volume, int level, Box3 box, int threads) {
+  const StoreReader& store = volume.store();
+  const Int3 extent = level_of(store, level).lattice.extent;
+  if (box.empty() || !(intersect(box, {{0, 0, 0}, extent}) == box))
+    throw UsageError("the box of samples is empty or leaves the volume");
+  const Int3 n = box.extent();
+  py::array samples(py::dtype(std::string(zarr_name(store.info().type))),
+                    std::vector<py::ssize_t>{n.z, n.y, n.x});
+  auto* out = static_cast<std::byte*>(samples.mutable_data());
+  const Index rows = level_of(store, level).lattice.brick.z;
+  run_interruptibly(py::none(), [&](Reporter reporter) {
+    Workers workers(threads);
+    for (Box3 part = box; part.lo.z < box.hi.z; part.lo.z = part.hi.z) {
+      if (reporter.cancel.stop_requested()) return;
+      part.hi.z = std::min(box.hi.z, (part.lo.z / rows + 1) * rows);
+      const auto before = static_cast<std::size_t>((part.lo.z - box.lo.z) * n.y * n.x);
+      workers.execute(
+          [&] { read_slab(store, level, part, out + before * size_of(store.info().type)); });
+    }
+  });
+  return samples;
+}
+
+std::optional<std::pair<double, double>> range_of(const OpenedVolume& volume) {
+  const py::gil_scoped_release release;
+  const StoreReader& store = volume.store();
+  ValueRange<double> range;
+  if (const auto stored = stored_histogram(store)) {
+    range = {stored->lo, stored->hi};
+  } else if (store.has_ranges(0)) {
+    const Box3 bricks{{0, 0, 0}, store.info().levels.front().lattice.bricks()};
+    for (const auto& of_brick : store.brick_ranges(0, bricks).ranges) range.include(of_brick);
+  }
+  if (range.empty()) return std::nullopt;
+  return std::pair(range.lo, range.hi);
+}
+
+Histogram histogram_of(const StoreReader& store, Progress& progress) {
+  if (auto stored = stored_histogram(store)) return std::move(*stored);
+  return histogram(store, progress, 1 << 16, true);
+}
+
+py::dict read_histogram(const OpenedVolume& volume, int bins, const py::object& callback) {
+  const Histogram h = interruptible(callback, [&](Reporter reporter) {
+    return histogram(volume.store(), reporter.progress, bins);
+  });
+  return py::dict(py::arg("counts") = py::array_t<std::uint64_t>(
+                      static_cast<py::ssize_t>(h.counts.size()), h.counts.data()),
+                  py::arg("first") = h.first, py::arg("bin_width") = h.bin_width,
+                  py::arg("lo") = h.lo, py::arg("hi") = h.hi, py::arg("level") = h.level,
+                  py::arg("nan") = h.not_a_number, py::arg("infinite") = h.infinite);
+}
+
+std::vector<double> isovalues_of(const OpenedVolume& volume, const std::string& text,
+                                 const py::object& callback) {
+  return interruptible(callback, [&](Reporter reporter) {
+    const std::vector<IsovalueRequest> requests = parse_isovalues(text);
+    Histogram samples;
+    if (std::any_of(requests.begin(), requests.end(), needs_histogram))
+      samples = histogram_of(volume.store(), reporter.progress);
+    std::vector<double> isovalues;
+    for (const IsovalueRequest& request : requests)
+      isovalues.push_back(resolve_isovalue(request, samples, volume.store().info().type));
+    return isovalues;
+  });
+}
+
+std::optional<std::pair<double, std::string>> suggestion(const OpenedVolume& volume,
+                                                         const py::object& callback) {
+  return interruptible(callback,
+                       [&](Reporter reporter) -> std::optional<std::pair<double, std::string>> {
+                         const StoreReader& store = volume.store();
+                         const auto suggested =
+                             suggest_isovalue(store.info(), histogram_of(store, reporter.progress));
+                         if (!suggested) return std::nullopt;
+                         return std::pair(suggested->value, suggested->why);
+                       });
+}
+
+void export_samples(const OpenedVolume& volume, const std::string& path, const std::string& format,
+                    const ExtractOptions& part, std::optional<double> isovalue, int half_band,
+                    bool force, const py::object& callback) {
+  const ExportOptions options{.format = format == "nrrd"  ? ExportFormat::nrrd
+                                        : format == "vdb" ? ExportFormat::vdb
+                                                          : ExportFormat::raw,
+                              .isovalue = isovalue,
+                              .inside = part.inside,
+                              .half_band = half_band,
+                              .level = part.level,
+                              .roi = part.roi,
+                              .force = force,
+                              .memory = part.memory,
+                              .threads = part.threads};
+  run_interruptibly(callback, [&](Reporter reporter) {
+    export_volume(volume.store(), path, options, reporter.progress);
+  });
+}
+
+}  // namespace
+
+void bind_store(py::module_& module) {
+  module.def("open", &open_volume);
+  module.def("default_cache_folder", [] { return default_cache_folder().string(); });
+  py::class_<OpenedVolume>(module, "Store")
+      .def_property_readonly("info",
+                             [](const OpenedVolume& v) { return describe(v.store().info()); })
+      .def_property_readonly("notes", &OpenedVolume::notes)
+      .def_property_readonly("range", &range_of)
+      .def("extract", &extract_mesh)
+      .def("save_mesh", &save_mesh)
+      .def("estimate", &estimate_mesh)
+      .def("read", &read_samples)
+      .def("histogram", &read_histogram)
+      .def("isovalues", &isovalues_of)
+      .def("suggested_isovalue", &suggestion)
+      .def("export", &export_samples);
+}
+
+}  // namespace isobrick::python

@@ -1,0 +1,104 @@
+"""Meshes: arrays that keep them alive, files, and the objects of other libraries."""
+
+import gc
+
+import numpy as np
+import pytest
+
+import isobrick
+from conftest import ball, same
+
+
+def test_arrays_keep_the_mesh_alive():
+    mesh = isobrick.extract(ball(), 1, normals=True)
+    vertices, normals, faces = mesh.vertices, mesh.normals, mesh.faces
+    copies = vertices.copy(), normals.copy(), faces.copy()
+    del mesh
+    gc.collect()
+    garbage = [isobrick.extract(ball(), i, normals=True) for i in range(3)]
+    for array, copy in zip((vertices, normals, faces), copies):
+        assert np.array_equal(array, copy) and array.base is not None
+    del garbage
+
+
+def test_arrays_are_views():
+    mesh = isobrick.extract(ball(), 1)
+    assert mesh.normals is None
+    first = mesh.vertices[0].copy()
+    mesh.vertices[:] += 1
+    assert mesh.vertices[0] == pytest.approx(first + 1)
+    assert np.from_dlpack(mesh.vertices).ctypes.data == mesh.vertices.ctypes.data
+    assert len(mesh) == len(mesh.faces)
+    assert "triangles" in repr(mesh) and "normals" not in repr(mesh)
+
+
+def test_an_empty_mesh():
+    mesh = isobrick.extract(ball(), 1000, normals=True)
+    assert mesh.vertices.shape == (0, 3) and mesh.faces.shape == (0, 3) and len(mesh) == 0
+    assert mesh.normals.shape == (0, 3)
+
+
+def test_meshes_of_others():
+    mesh = isobrick.Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], unit="millimeter")
+    assert mesh.faces.tolist() == [[0, 1, 2]] and mesh.unit == "millimeter"
+    for faces in ([[0, 1, 3]], [[0, 1, -1]], [[0, 1, 0.5]]):
+        with pytest.raises((TypeError, ValueError)):
+            isobrick.Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], faces)
+    with pytest.raises(ValueError):
+        isobrick.Mesh([[0, 0], [1, 0], [0, 1]], [[0, 1, 2]])
+
+
+@pytest.mark.parametrize("extension", ["ply", "stl", "obj", "glb", "vtp"])
+def test_files(tmp_path, extension):
+    mesh = isobrick.extract(ball(), 1, normals=True)
+    path = tmp_path / f"a.{extension}"
+    mesh.save(path)
+    size = path.stat().st_size
+    assert size > 10 * len(mesh)
+    with pytest.raises(isobrick.UsageError, match="exists"):
+        mesh.save(path)
+    mesh.save(str(path), force=True)
+    assert path.stat().st_size == size
+
+
+def test_files_that_cannot_be(tmp_path):
+    mesh = isobrick.extract(ball(), 1)
+    with pytest.raises(ValueError, match="a.xyz"):
+        mesh.save(tmp_path / "a.xyz")
+    with pytest.raises(isobrick.Error):
+        mesh.save(tmp_path / "none" / "a.ply")
+    mesh.faces[5, 1] = len(mesh.vertices)
+    with pytest.raises(ValueError, match="a face names vertex"):
+        mesh.save(tmp_path / "a.stl")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_vtk():
+    pytest.importorskip("vtkmodules.vtkCommonDataModel")
+    from vtkmodules.util.numpy_support import vtk_to_numpy
+
+    mesh = isobrick.extract(ball(), 1, normals=True)
+    vertices, faces, normals = mesh.vertices.copy(), mesh.faces.copy(), mesh.normals.copy()
+    data = mesh.to_vtk()
+    del mesh
+    gc.collect()
+    garbage = [isobrick.extract(ball(), i, normals=True) for i in range(3)]
+    assert np.array_equal(vtk_to_numpy(data.GetPoints().GetData()), vertices)
+    assert np.array_equal(vtk_to_numpy(data.GetPointData().GetNormals()), normals)
+    assert np.array_equal(vtk_to_numpy(data.GetPolys().GetConnectivityArray()).reshape(-1, 3), faces)
+    assert data.GetNumberOfCells() == len(faces)
+    del garbage
+
+
+@pytest.mark.parametrize("module", ["trimesh", "meshio", "pyvista"])
+def test_other_libraries(module):
+    pytest.importorskip(module)
+    mesh = isobrick.extract(ball(), 1, normals=True)
+    other = getattr(mesh, f"to_{module}")()
+    points = {"trimesh": "vertices", "meshio": "points", "pyvista": "points"}[module]
+    assert np.allclose(getattr(other, points), mesh.vertices)
+
+
+def test_copies_of_a_mesh_are_the_same():
+    mesh = isobrick.extract(ball(), 1, normals=True)
+    assert same(isobrick.Mesh(mesh.vertices, mesh.faces, mesh.normals), mesh)

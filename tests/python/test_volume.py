@@ -1,0 +1,175 @@
+"""Volumes in stores and files."""
+
+import gc
+
+import numpy as np
+import pytest
+
+import isobrick
+from conftest import is_closed, same
+
+
+@pytest.fixture
+def samples():
+    return isobrick.synth("gyroid", shape=(60, 50, 40), dtype="uint8")
+
+
+def test_what_is_known_of_a_store(store, samples):
+    volume = isobrick.open(store)
+    assert volume.shape == (60, 50, 40) and volume.dtype == np.uint8
+    assert volume.levels[0].shape == volume.shape and volume.levels[0].brick == (16, 16, 16)
+    assert len(volume.levels) > 1 and volume.levels[1].shape == (30, 25, 20)
+    assert volume.levels[1].spacing == (2, 2, 2) and volume.spacing == (1, 1, 1)
+    assert volume.range == (samples.min(), samples.max())
+    assert volume.path == str(store) and "60×50×40" in repr(volume)
+    assert np.array_equal(volume.direction, np.eye(3)) and volume.unit == ""
+    assert volume.info["is_store"] and isobrick.info(store) == volume.info
+
+
+def test_the_mesh_is_that_of_the_array(store, samples):
+    volume = isobrick.open(store)
+    mesh = volume.extract(127.5, normals=True)
+    assert len(mesh) > 1000 and same(mesh, isobrick.extract(samples, 127.5, normals=True))
+    roi = np.s_[5:50, :, 10:]
+    assert same(volume.extract(127.5, roi=roi), isobrick.extract(samples, 127.5, roi=roi))
+    assert same(volume.extract(127.5, backend="cpu", threads=1, memory="64M"), volume.extract(127.5))
+    coarse = volume.extract(127.5, level=1)
+    assert 0 < len(coarse) < len(mesh)
+
+
+def test_samples_are_read_as_arrays(store, samples):
+    volume = isobrick.open(store)
+    assert np.array_equal(volume.read(), samples)
+    assert np.array_equal(volume[3:20, 7, -5:], samples[3:20, 7, -5:])
+    assert np.array_equal(volume[..., 4], samples[..., 4])
+    assert volume[1, 2, 3] == samples[1, 2, 3]
+    assert volume.read(1).shape == volume.levels[1].shape
+    assert np.array_equal(volume.read(0, np.s_[10:11]), samples[10:11])
+    with pytest.raises(IndexError):
+        volume[60, 0, 0]
+    with pytest.raises(ValueError, match="step"):
+        volume[::2]
+    with pytest.raises(ValueError, match="no level 9"):
+        volume.read(9)
+
+
+def test_isovalues_as_texts(store, samples):
+    volume = isobrick.open(store)
+    assert volume.isovalue("50%") == pytest.approx((int(samples.min()) + int(samples.max())) / 2)
+    assert samples.min() < volume.isovalue("otsu") < samples.max()
+    assert volume.isovalues("100:140:20") == [100, 120, 140]
+    assert same(volume.extract("otsu"), volume.extract(volume.isovalue("otsu")))
+    assert volume.suggested_isovalue()[0] == volume.isovalue("otsu")
+    with pytest.raises(ValueError):
+        volume.extract("otsu,p90")
+    with pytest.raises(ValueError):
+        volume.extract("many")
+    with pytest.raises(ValueError, match="NaN"):
+        volume.extract(np.nan)
+
+
+def test_the_histogram_is_that_of_numpy(store, samples):
+    histogram = isobrick.open(store).histogram(256)
+    expected = np.bincount(samples.ravel(), minlength=256)
+    first = int(histogram.first)
+    assert histogram.bin_width == 1
+    assert np.array_equal(histogram.counts, expected[first : first + len(histogram.counts)])
+    assert len(histogram.edges) == len(histogram.counts) + 1
+    assert (histogram.lo, histogram.hi) == (samples.min(), samples.max())
+
+
+def test_a_surface_streams_to_a_file(store, tmp_path):
+    volume = isobrick.open(store)
+    report = volume.save_mesh(tmp_path / "a.ply", "otsu", normals=True)
+    mesh = volume.extract("otsu", normals=True)
+    assert report["faces"] == len(mesh) and report["backend"] == "cpu"
+    mesh.save(tmp_path / "b.ply")
+    assert (tmp_path / "a.ply").stat().st_size == (tmp_path / "b.ply").stat().st_size
+    estimate = volume.estimate("otsu")
+    assert estimate["faces"] == pytest.approx(len(mesh), rel=0.5)
+
+
+def test_files_of_other_formats(samples, tmp_path):
+    raw = tmp_path / "a.raw"
+    samples.tofile(raw)
+    options = {"shape": samples.shape, "dtype": "uint8", "spacing": (1, 2, 3), "unit": "mm"}
+    volume = isobrick.open(raw, cache=tmp_path / "cache", **options)
+    assert volume.spacing == (1, 2, 3) and volume.unit == "millimeter"
+    expected = isobrick.extract(samples, 127.5, spacing=(1, 2, 3), unit="mm")
+    assert same(volume.extract(127.5), expected)
+    assert volume.extract(127.5).unit == "millimeter"
+    assert list((tmp_path / "cache").iterdir())
+    volume = isobrick.open(raw, cache=False, stride=2, **options)
+    assert volume.shape == (30, 25, 20)
+    part = isobrick.open(raw, cache=False, roi=np.s_[10:20, :, 5:], stride=(1, 2, 1), **options)
+    assert np.array_equal(part.read(), samples[10:20, ::2, 5:])
+    for wrong in ({"roi": 3}, {"roi": np.s_[::2]}, {"roi": np.s_[70:80]}, {"stride": 0}):
+        with pytest.raises((TypeError, ValueError)):
+            isobrick.open(raw, cache=False, **options, **wrong)
+    # The store is gone with the volume; the mesh is not.
+    mesh = volume.extract(127.5)
+    del volume
+    gc.collect()
+    assert mesh.faces.max() < len(mesh.vertices)
+
+
+def test_hdf5_by_its_module(samples, tmp_path):
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["fields/density"] = samples
+    try:
+        volume = isobrick.open(f"{tmp_path}/a.h5:/fields/density", cache=tmp_path / "cache")
+    except isobrick.Error as error:
+        assert "built without" in str(error)
+        pytest.skip("built without HDF5")
+    assert np.array_equal(volume.read(), samples)
+
+
+def test_zarr_on_the_disk(store, tmp_path, samples):
+    zarr = pytest.importorskip("zarr")
+    group = zarr.open_group(str(tmp_path / "other.zarr"), mode="w")
+    array = group.create_dataset("a", data=samples, chunks=(20, 20, 20))
+    volume = isobrick.open(array, cache=tmp_path / "cache")
+    assert same(volume.extract(127.5), isobrick.extract(samples, 127.5))
+    with pytest.raises(ValueError, match="not on the disk"):
+        isobrick.open(zarr.array(samples))
+
+
+def test_what_is_no_volume(tmp_path):
+    with pytest.raises(FileNotFoundError, match="none.zarr"):
+        isobrick.open(tmp_path / "none.zarr")
+    (tmp_path / "empty.zarr").mkdir()
+    with pytest.raises(isobrick.Error):
+        isobrick.open(tmp_path / "empty.zarr")
+    (tmp_path / "text.raw").write_text("text")
+    with pytest.raises(ValueError):
+        isobrick.open(tmp_path / "text.raw", cache=False)
+    with pytest.raises(TypeError):
+        isobrick.open(3)
+
+
+def test_damage_is_an_oserror(store):
+    largest = max((p for p in store.rglob("*") if p.is_file()), key=lambda p: p.stat().st_size)
+    data = bytearray(largest.read_bytes())
+    data[: len(data) // 2] = bytes(len(data) // 2)
+    largest.write_bytes(data)
+    with pytest.raises(OSError) as error:
+        isobrick.open(store).extract(127.5)
+    assert isinstance(error.value, isobrick.DamageError) and str(error.value)
+    assert not isobrick.verify(store)["whole"]
+
+
+def test_arguments_that_make_no_sense(store):
+    volume = isobrick.open(store)
+    for arguments in ({"level": -1}, {"level": 7}, {"backend": "gpu"}, {"memory": 0}):
+        with pytest.raises(ValueError):
+            volume.extract(127.5, **arguments)
+    with pytest.raises(TypeError):
+        volume.extract(127.5, level="1")
+    with pytest.raises(TypeError):
+        isobrick.open(store, colour=3)
+
+
+def test_a_surface_of_a_store_is_closed(tmp_path):
+    isobrick.synth("sphere", tmp_path / "a.zarr", shape=(40, 40, 40), dtype="float32")
+    assert is_closed(isobrick.open(tmp_path / "a.zarr").extract(0).faces)
