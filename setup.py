@@ -19,7 +19,7 @@ ROOT = Path(__file__).resolve().parent
 
 
 def version():
-    return re.search(r"VERSION ([\d.]+)", (ROOT / "CMakeLists.txt").read_text())[1]
+    return re.search(r"project\(isobrick VERSION ([\d.]+)", (ROOT / "CMakeLists.txt").read_text())[1]
 
 
 class CMakeBuild(build_ext):

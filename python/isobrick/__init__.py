@@ -6,8 +6,8 @@
     mesh.vertices, mesh.faces                                      # NumPy arrays without copies
     mesh.save("bone.ply")
 
-    with_store = isobrick.open("scan.nrrd")                        # any format, by way of a store
-    with_store.extract("otsu", level=1, normals=True)
+    volume = isobrick.open("scan.nrrd")                            # a file of any format
+    volume.extract("otsu", level=1, normals=True)
 
 Axis order: arrays and all that indexes them (shape, roi, brick) are [z, y, x]. World space (spacing,
 origin, direction, vertices, normals) is x, y, z, as in VTK, SimpleITK and nibabel. Only
@@ -44,3 +44,9 @@ __all__ = [
     "synth",
     "verify",
 ]
+
+# Messages and help() name things as programs do.
+for _thing in (globals()[_name] for _name in __all__):
+    if hasattr(_thing, "__module__"):
+        _thing.__module__ = __name__
+del _thing

@@ -110,19 +110,23 @@ def check_rotation(m):
                 raise UsageError("direction must be a rotation: its columns are not orthonormal")
 
 
-def box_of(roi, shape):
-    """((z, y, x), (z, y, x)) from three slices, within the shape; None for None."""
-    if roi is None:
-        return None
+def slices_of(roi):
+    """Three slices [z, y, x] without steps."""
     if isinstance(roi, slice) or not hasattr(roi, "__len__"):
         roi = (roi,)
     if len(roi) > 3 or not all(isinstance(part, slice) for part in roi):
         raise TypeError(f"roi must be slices [z, y, x] such as numpy.s_[0:10, :, 5:], not {roi!r}")
-    slices = tuple(roi) + (slice(None),) * (3 - len(roi))
+    if any(part.step not in (None, 1) for part in roi):
+        raise UsageError("roi takes slices without a step")
+    return tuple(roi) + (slice(None),) * (3 - len(roi))
+
+
+def box_of(roi, shape):
+    """((z, y, x), (z, y, x)) from three slices, within the shape; None for None."""
+    if roi is None:
+        return None
     lo, hi = [], []
-    for part, size in zip(slices, shape):
-        if part.step not in (None, 1):
-            raise UsageError("roi takes slices without a step")
+    for part, size in zip(slices_of(roi), shape):
         begin, end, _ = part.indices(size)
         lo.append(begin)
         hi.append(end)

@@ -1,18 +1,20 @@
 """Reads arrays that are not in memory, box by box."""
 
 import itertools
+import threading
 from collections import OrderedDict
 
 import numpy as np
 
-# Bytes of chunks that are kept: boxes share chunks with their neighbours.
-_KEPT_BYTES = 2**28
+# Fewer chunks than the corners of a box touch are of no use.
+_LEAST_ROOM = 8
 
 
 class BlockReader:
     """Gives the samples of boxes of an array with `shape`, `dtype` and `__getitem__`.
 
-    The chunks of dask and zarr are read whole and kept for the next boxes, as many as fit.
+    The chunks of dask and zarr are read whole and kept for the next boxes, which share them, as
+    many as fit the memory that `set_memory` allows.
     """
 
     def __init__(self, array, dtype):
@@ -20,16 +22,31 @@ class BlockReader:
         self.dtype = dtype
         self.bounds = _chunk_bounds(array)
         self.kept = OrderedDict()
-        if self.bounds:
-            largest = np.prod([np.diff(bounds).max() for bounds in self.bounds])
-            self.room = int(_KEPT_BYTES // max(1, largest * dtype.itemsize))
-            if self.room < 8:
-                self.bounds = None
+        self.room = 0
+        self.lock = threading.Lock()  # extractors are shared by threads
+
+    def set_memory(self, memory):
+        """Sets a budget in bytes. Returns how much of it the chunks may take."""
+        if self.bounds is None:
+            return 0
+        samples = np.prod([np.diff(bounds).max() for bounds in self.bounds], dtype=float)
+        room = int(memory // (samples * self.dtype.itemsize))
+        room = room if room >= _LEAST_ROOM else 0
+        with self.lock:
+            self.room = room
+            while len(self.kept) > room:
+                self.kept.popitem(last=False)
+        return memory if room else 0
 
     def __call__(self, lo, hi):
         """The samples of a box as a new array [z, y, x]."""
-        if self.bounds is None:
-            return self._read([tuple(map(slice, lo, hi))])[0]
+        with self.lock:
+            if not self.room:
+                return self._read([tuple(map(slice, lo, hi))])[0]
+            return self._join(lo, hi)
+
+    def _join(self, lo, hi):
+        """The samples of a box out of chunks."""
         out = np.empty([end - begin for begin, end in zip(lo, hi)], self.dtype)
         for chunk, samples in self._chunks(lo, hi):
             first = [bounds[i] for bounds, i in zip(self.bounds, chunk)]
@@ -47,15 +64,15 @@ class BlockReader:
             for bounds, begin, end in zip(self.bounds, lo, hi)
         ]
         chunks = list(itertools.product(*numbers))
-        for i in range(0, len(chunks), max(1, self.room // 2)):
-            some = chunks[i : i + max(1, self.room // 2)]
+        for i in range(0, len(chunks), self.room // 2):
+            some = chunks[i : i + self.room // 2]
             missing = [chunk for chunk in some if chunk not in self.kept]
+            for chunk in set(some).difference(missing):
+                self.kept.move_to_end(chunk)
+            while len(self.kept) + len(missing) > self.room:
+                self.kept.popitem(last=False)
             for chunk, samples in zip(missing, self._read([self._slices(c) for c in missing])):
                 self.kept[chunk] = samples
-            for chunk in some:
-                self.kept.move_to_end(chunk)
-            while len(self.kept) > self.room:
-                self.kept.popitem(last=False)
             for chunk in some:
                 yield chunk, self.kept[chunk]
 

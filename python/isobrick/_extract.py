@@ -42,19 +42,18 @@ class Extractor:
             array, spacing=spacing, origin=origin, direction=direction, unit=unit, mask=mask
         )
         nodata = None if nodata is None else number(nodata, "nodata")
-        self._shape = samples.shape
-        self._dtype = samples.dtype
+        self._samples = samples
         self._native = samples.extractor(nodata)
 
     @property
     def shape(self):
         """Samples along z, y, x."""
-        return self._shape
+        return self._samples.shape
 
     @property
     def dtype(self):
         """The NumPy dtype of the samples."""
-        return self._dtype
+        return self._samples.dtype
 
     @property
     def range(self):
@@ -116,10 +115,12 @@ class Extractor:
                 f"the isovalue of an array must be a number, not {isovalue!r}; "
                 "isobrick.open takes texts such as 'otsu'"
             )
-        return extract_options(
-            isovalue, box=box_of(roi, self._shape), normals=normals, inside=inside,
+        options = extract_options(
+            isovalue, box=box_of(roi, self.shape), normals=normals, inside=inside,
             drop_degenerate=drop_degenerate, memory=memory, threads=threads,
         )
+        options.memory_of_others = self._samples.set_memory(options.memory)
+        return options
 
 
 def extract(

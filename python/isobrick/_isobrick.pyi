@@ -34,6 +34,7 @@ class ExtractOptions:
     normals: bool
     drop_degenerate: bool
     memory: int
+    memory_of_others: int
     threads: int
     backend: Backend
     gpu_memory: int
@@ -67,7 +68,6 @@ class ConvertOptions:
     shard: Optional[int]
     zstd_level: Optional[int]
     levels: Optional[int]
-    factors: list[Zyx]
     memory: int
     threads: int
     resume: bool
@@ -167,6 +167,7 @@ def convert_function(
     read: Callable[[Zyx, Zyx], np.ndarray],
     extent: Zyx,
     type: str,
+    memory: int,
     transform: Transform,
     out: str,
     options: ConvertOptions,

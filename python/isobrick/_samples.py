@@ -90,6 +90,8 @@ class Samples:
             )
         self.array = array
         self.mask = _checked_mask(mask, self.shape)
+        samples = np.dtype("uint8") if self.dtype == np.dtype("?") else self.dtype
+        self.reader = None if self.in_memory else BlockReader(array, samples)
         self.transform = transform(spacing, origin, direction, unit or "")
 
     @property
@@ -101,19 +103,21 @@ class Samples:
         if self.in_memory:
             return _isobrick.ArrayExtractor.of_array(self.array, self.transform, nodata, self.mask)
         return _isobrick.ArrayExtractor.of_function(
-            *self._reader(), self.transform, nodata, self.mask
+            self.reader, self.shape, self.reader.dtype.name, self.transform, nodata, self.mask
         )
+
+    def set_memory(self, memory):
+        """Shares a budget in bytes with what reads blocks. Returns how much of it that takes."""
+        return 0 if self.in_memory else self.reader.set_memory(memory // 4)
 
     def convert(self, path, options, report):
         """Writes a store."""
         if self.in_memory:
             return _isobrick.convert_array(self.array, self.transform, path, options, report)
-        return _isobrick.convert_function(*self._reader(), self.transform, path, options, report)
-
-    def _reader(self):
-        """What reads boxes, the shape, and the name of the type."""
-        dtype = np.dtype("uint8") if self.dtype == np.dtype("?") else self.dtype
-        return BlockReader(self.array, dtype), self.shape, dtype.name
+        return _isobrick.convert_function(
+            self.reader, self.shape, self.reader.dtype.name, self.set_memory(options.memory),
+            self.transform, path, options, report,
+        )
 
 
 def _in_memory_or_lazy(array):

@@ -10,7 +10,7 @@ import numpy as np
 from . import _isobrick
 from ._arguments import (
     box_of, byte_count, extract_options, integer, integers, mesh_file_options, number, numbers,
-    path_text, thread_count,
+    path_text, slices_of, thread_count,
 )
 from ._errors import UsageError
 from ._mesh import Mesh
@@ -350,7 +350,8 @@ def volume_request(
     if nodata is not None:
         request.nodata = number(nodata, "nodata")
     if roi is not None:
-        request.set_roi([part.start for part in roi], [part.stop for part in roi])
+        parts = slices_of(roi)
+        request.set_roi([part.start for part in parts], [part.stop for part in parts])
     if memory is not None:
         request.memory = byte_count(memory)
     request.threads = thread_count(threads)
@@ -386,8 +387,9 @@ def open(
         Of world space x, y, z, in place of the file's.
     channel, time, grid
         Which of several volumes in the file.
-    stride, nodata
-        Every so-many-th sample; a value that means that a sample is missing.
+    stride, roi, nodata
+        Every so-many-th sample, an int or three along z, y, x; of those only the slices
+        [z, y, x]; a value that means that a sample is missing.
 
     Raises FileNotFoundError, DamageError for broken files, UsageError where something must be
     chosen, Error otherwise.

@@ -2,7 +2,8 @@
 
 namespace isobrick::python {
 
-ArraySource::ArraySource(const Volume& volume, const std::string& name) : samples_(volume) {
+ArraySource::ArraySource(const Volume& volume, const std::string& name, std::size_t memory)
+    : samples_(volume), memory_(memory) {
   info_.extent = volume.extent;
   info_.type = samples_.lattice.type;
   info_.transform = volume.transform;

@@ -32,7 +32,6 @@ void bind_convert_options(py::module_& module) {
       .def_readwrite("shard", &ConvertOptions::shard)
       .def_readwrite("zstd_level", &ConvertOptions::zstd_level)
       .def_readwrite("levels", &ConvertOptions::levels)
-      .def_readwrite("factors", &ConvertOptions::factors)
       .def_readwrite("memory", &ConvertOptions::memory)
       .def_readwrite("threads", &ConvertOptions::threads)
       .def_readwrite("resume", &ConvertOptions::resume)
@@ -62,24 +61,25 @@ py::dict convert_file(const std::string& path, const std::string& out, const Vol
   }));
 }
 
-py::dict convert_volume(Volume volume, const Transform& transform, const std::string& out,
-                        const ConvertOptions& options, const py::object& callback) {
+py::dict convert_volume(Volume volume, std::size_t memory, const Transform& transform,
+                        const std::string& out, const ConvertOptions& options,
+                        const py::object& callback) {
   volume.transform = transform;
   return describe(interruptible(callback, [&](Reporter reporter) {
-    ArraySource source(volume, "array");
+    ArraySource source(volume, "array", memory);
     return convert(source, out, options, reporter.progress);
   }));
 }
 
 py::dict convert_array(const py::array& array, const Transform& transform, const std::string& out,
                        const ConvertOptions& options, const py::object& callback) {
-  return convert_volume(volume_of(array), transform, out, options, callback);
+  return convert_volume(volume_of(array), 0, transform, out, options, callback);
 }
 
-py::dict convert_function(const py::object& read, Int3 extent, ScalarType type,
+py::dict convert_function(const py::object& read, Int3 extent, ScalarType type, std::size_t memory,
                           const Transform& transform, const std::string& out,
                           const ConvertOptions& options, const py::object& callback) {
-  return convert_volume(volume_of(read, extent, type), transform, out, options, callback);
+  return convert_volume(volume_of(read, extent, type), memory, transform, out, options, callback);
 }
 
 py::dict index_store(const std::string& path, const std::string& kind, Index leaf,
@@ -114,8 +114,11 @@ py::dict verify_store(const std::string& path, const VolumeRequest& request,
 }
 
 py::dict describe_path(const std::string& path, const VolumeRequest& request) {
-  if (is_zarr(path)) return describe(StoreReader(path, request.selection).info());
-  return describe(open_source(path, request)->info());
+  if (is_zarr(path))
+    return describe(interruptible(
+        py::none(), [&](Reporter) { return StoreReader(path, request.selection).info(); }));
+  return describe(
+      interruptible(py::none(), [&](Reporter) { return open_source(path, request)->info(); }));
 }
 
 std::unique_ptr<VolumeSource> synth_source(const std::string& kind, Int3 extent, ScalarType type,

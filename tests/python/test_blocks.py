@@ -1,6 +1,7 @@
 """Arrays that are not in memory: dask, zarr, h5py, xarray, and anything alike."""
 
 import gc
+import threading
 
 import numpy as np
 import pytest
@@ -55,10 +56,32 @@ def test_dask_by_blocks():
     )
     assert same(isobrick.extract(lazy, 1, normals=True), isobrick.extract(field, 1, normals=True))
     assert len(read) == 12, "each chunk is computed once"
+    expected = isobrick.extract(field, 1)
+    assert same(isobrick.extract(lazy, 1, memory="32M"), expected)
+    assert same(isobrick.extract(lazy, 1, memory="12M"), expected)
+    with pytest.raises(ValueError, match="1.0 MiB is too small"):
+        isobrick.extract(lazy, 1, memory="1M")
     sliced = lazy[::2, 5:, ::-1]
     assert same(isobrick.extract(sliced, 1), isobrick.extract(field[::2, 5:, ::-1], 1))
     with pytest.raises(ZeroDivisionError):
         isobrick.extract(da.map_blocks(lambda b: 1 // 0, lazy, dtype="f4", meta=field[:0, :0, :0]), 1)
+
+
+def test_threads_share_an_extractor_of_blocks():
+    da = pytest.importorskip("dask.array")
+    field = ball((100, 90, 80), 30)
+    extractor = isobrick.Extractor(da.from_array(field, chunks=25))
+    meshes = {}
+
+    def extract(isovalue):
+        meshes[isovalue] = extractor.extract(isovalue, memory=f"{20 + 10 * isovalue}M")
+
+    threads = [threading.Thread(target=extract, args=(i,)) for i in range(5)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert all(same(meshes[i], isobrick.extract(field, i)) for i in range(5))
 
 
 def test_zarr_in_memory():

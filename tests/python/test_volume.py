@@ -101,6 +101,11 @@ def test_files_of_other_formats(samples, tmp_path):
     assert list((tmp_path / "cache").iterdir())
     volume = isobrick.open(raw, cache=False, stride=2, **options)
     assert volume.shape == (30, 25, 20)
+    part = isobrick.open(raw, cache=False, roi=np.s_[10:20, :, 5:], stride=(1, 2, 1), **options)
+    assert np.array_equal(part.read(), samples[10:20, ::2, 5:])
+    for wrong in ({"roi": 3}, {"roi": np.s_[::2]}, {"roi": np.s_[70:80]}, {"stride": 0}):
+        with pytest.raises((TypeError, ValueError)):
+            isobrick.open(raw, cache=False, **options, **wrong)
     # The store is gone with the volume; the mesh is not.
     mesh = volume.extract(127.5)
     del volume
