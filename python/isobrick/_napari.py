@@ -6,6 +6,7 @@ import os
 import numpy as np
 
 from ._errors import Error
+from ._operations import info
 from ._volume import open as open_volume
 
 
@@ -59,10 +60,15 @@ class LevelArray:
 
 
 def reader_of(path):
-    """A function that gives the layers of a path, or None for what other readers should open."""
+    """A function that gives the layers of a store; None for anything else, which others open.
+
+    An image of another program would have to be converted first.
+    """
     if isinstance(path, (list, tuple)):  # files to be stacked
         return None
     try:
+        if not info(path)["is_store"]:
+            return None
         volume = open_volume(path)
     except (Error, OSError):
         return None

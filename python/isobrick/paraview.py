@@ -39,7 +39,7 @@ class _VolumeSource(VTKPythonAlgorithmBase):
         self._level = -1
         self._region = (0.0,) * 6
         self._memory = "1G"
-        self._failed = False
+        self._error = ""
 
     def SetFileName(self, name):
         self._set("_file_name", "" if name in (None, "None") else name, reopen=True)
@@ -60,13 +60,19 @@ class _VolumeSource(VTKPythonAlgorithmBase):
         self._set("_memory", memory)
 
     def RequestInformation(self, request, inputs, outputs):
-        self._failed = not self._run(self._describe, outputs.GetInformationObject(0))
+        # An error is reported with the data, since more properties may be set before.
+        self._error = self._run(self._describe, outputs.GetInformationObject(0))
         return 1  # 0 would make the pipeline add an error of many lines
 
     def RequestData(self, request, inputs, outputs):
         information = outputs.GetInformationObject(0)
-        if self._failed or not self._run(self._produce, information):
+        error = self._error
+        if error is None:
+            error = self._run(self._produce, information)
+        if error is not None:
             information.Get(vtkDataObject.DATA_OBJECT()).Initialize()
+        if error:
+            print_error(f"Isobrick: {error}")
         return 1
 
     def _set(self, name, value, reopen=False):
@@ -77,24 +83,21 @@ class _VolumeSource(VTKPythonAlgorithmBase):
             self.Modified()
 
     def _run(self, function, information):
-        """Calls a step of the pipeline once the volume is open; an error becomes one line.
+        """Calls a step of the pipeline once the volume is open.
 
-        Returns whether it succeeded.
+        Returns None, or what went wrong in one line; "" for an abort, or for lack of a name.
         """
         if not self._file_name:
-            return False  # a source that has just been made
+            return ""  # a source that has just been made
         try:
             self._open()
             function(information)
         except _Aborted:
-            return False
+            return ""
         except (OSError, MemoryError, RuntimeError, TypeError, ValueError) as error:
             text = getattr(error, "strerror", None) or str(error) or type(error).__name__
-            if self._file_name not in text:
-                text = f"{self._file_name}: {text}"
-            print_error(f"Isobrick: {text}")
-            return False
-        return True
+            return text if self._file_name in text else f"{self._file_name}: {text}"
+        return None
 
     def _open(self):
         if self._volume is None:

@@ -59,7 +59,8 @@ def test_rotations_are_in_the_order_of_the_array(tmp_path):
     assert np.allclose(place, [3, 3, -4])
 
 
-def test_what_other_readers_open(tmp_path):
+def test_what_other_readers_open(tmp_path, image):
+    assert reader_of(str(image[0])) is None
     assert reader_of(str(tmp_path / "none.zarr")) is None
     assert reader_of([str(tmp_path)]) is None
     (tmp_path / "empty.zarr").mkdir()

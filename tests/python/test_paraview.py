@@ -23,7 +23,6 @@ import numpy as np
 import isobrick
 LoadPlugin({str(PLUGIN)!r}, remote=False, ns=globals())
 path = sys.argv[1]
-volume = isobrick.open(path)
 
 def vertices(data):
     return vtk_to_numpy(data.GetPoints().GetData())
@@ -62,7 +61,8 @@ def run(script, *arguments, program="pvpython", display=False, **options):
 def script(tmp_path):
     def write(text):
         path = tmp_path / "script.py"
-        path.write_text(BEGIN + text + "\nprint('done')\n")
+        begin = BEGIN + ("volume = isobrick.open(path)\n" if "volume." in text else "")
+        path.write_text(begin + text + "\nprint('done')\n")
         return path
 
     return write
@@ -235,6 +235,23 @@ assert output(surface).GetNumberOfCells() == len(volume.extract("otsu"))
 surface.FileName = path
 assert field(output(surface), "name") == ["gyroid.zarr"]
 """), store, field)
+    assert errors == ""
+
+
+def test_channels_and_times(script, image):
+    path, samples = image
+    np.save(path.parent / "samples.npy", samples)
+    errors = run(script("""
+samples = np.load(sys.argv[2])
+for time, channel in ((0, 1), (2, 0)):
+    request = dict(FileName=path, Channel=channel, Time=time)
+    data = output(IsobrickVolume(**request))
+    assert points(data, "samples").tobytes() == samples[time, channel].tobytes()
+    assert data.GetSpacing() == (0.5, 0.5, 2) and field(data, "unit") == ["micrometer"]
+    mesh = isobrick.extract(samples[time, channel], 200, spacing=(0.5, 0.5, 2))
+    data = output(IsobrickSurface(Isovalues="200", Normals=0, **request))
+    assert vertices(data).tobytes() == mesh.vertices.tobytes() and len(mesh) > 100
+"""), path, path.parent / "samples.npy")
     assert errors == ""
 
 
