@@ -55,7 +55,8 @@ setup(
     version=version(),
     packages=["isobrick"],
     package_dir={"": "python"},
-    package_data={"isobrick": ["py.typed", "*.pyi"]},
+    package_data={"isobrick": ["py.typed", "*.pyi", "napari.yaml"]},
+    data_files=[("share/isobrick/paraview", ["python/paraview/isobrick.xml"])],
     ext_modules=[Extension("isobrick._isobrick", [])],
     cmdclass={"build_ext": CMakeBuild},
 )

@@ -105,26 +105,29 @@ class Mesh:
         )
 
     def to_vtk(self):
-        """A `vtkPolyData`; it shares the vertices and the normals, and copies the faces."""
-        from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray
-        from vtkmodules.vtkCommonCore import vtkPoints
-        from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData
+        """A `vtkPolyData` that shares vertices, normals and faces, and keeps them alive.
+
+        Faces of more than 2³¹ vertices or corners are copied. The unit is a string in the field
+        data, as in .vtp files.
+        """
+        from vtkmodules.util.numpy_support import numpy_to_vtk
+        from vtkmodules.vtkCommonCore import vtkPoints, vtkStringArray
+        from vtkmodules.vtkCommonDataModel import vtkPolyData
 
         data = vtkPolyData()
         points = vtkPoints()
         points.SetData(numpy_to_vtk(self.vertices))
         data.SetPoints(points)
-        cells = vtkCellArray()
-        offsets = np.arange(0, 3 * len(self.faces) + 1, 3, dtype=np.int64)
-        connectivity = self.faces.astype(np.int64).ravel()
-        cells.SetData(
-            numpy_to_vtkIdTypeArray(offsets, deep=1), numpy_to_vtkIdTypeArray(connectivity, deep=1)
-        )
-        data.SetPolys(cells)
+        data.SetPolys(_vtk_cells(self.faces, len(self.vertices)))
         if self.normals is not None and len(self.vertices):
             normals = numpy_to_vtk(self.normals)
             normals.SetName("Normals")
             data.GetPointData().SetNormals(normals)
+        if self.unit:
+            unit = vtkStringArray()
+            unit.SetName("unit")
+            unit.InsertNextValue(self.unit)
+            data.GetFieldData().AddArray(unit)
         return data
 
     def to_pyvista(self):
@@ -139,3 +142,21 @@ class Mesh:
 
         data = {} if self.normals is None else {"normals": self.normals}
         return meshio.Mesh(self.vertices, [("triangle", self.faces)], point_data=data)
+
+
+def _vtk_cells(faces, vertices):
+    """A `vtkCellArray` of triangles, of 32 bits in the memory of the faces where they are enough."""
+    from vtkmodules.util.numpy_support import numpy_to_vtk
+    from vtkmodules.vtkCommonDataModel import vtkCellArray
+
+    small = max(vertices, faces.size) < 2**31
+    type = np.int32 if small else np.int64
+    corners = faces.view(np.int32) if small else faces.astype(np.int64)
+    corners = corners.reshape(-1)
+    offsets = np.arange(0, 3 * len(faces) + 1, 3, dtype=type)
+    cells = vtkCellArray()
+    cells.SetData(numpy_to_vtk(offsets), numpy_to_vtk(corners))
+    # The cells hold arrays of their own on the same memory.
+    cells.GetOffsetsArray()._numpy_reference = offsets
+    cells.GetConnectivityArray()._numpy_reference = corners
+    return cells

@@ -1,5 +1,7 @@
 """Fields and measures that the tests share. A file whose tests are all skipped ends with 77."""
 
+import json
+
 import numpy as np
 import pytest
 
@@ -49,6 +51,31 @@ def store(tmp_path):
     path = tmp_path / "gyroid.zarr"
     isobrick.synth("gyroid", path, shape=(60, 50, 40), dtype="uint8", brick=16)
     return path
+
+
+@pytest.fixture
+def image(tmp_path):
+    """An OME-Zarr image of another program with 3 times, 2 channels, 8×20×24 samples; its array."""
+    samples = np.random.default_rng(1).integers(0, 255, (3, 2, 8, 20, 24), np.uint8)
+    path = tmp_path / "image.zarr"
+    axes = [{"name": "t", "type": "time"}, {"name": "c", "type": "channel"}]
+    axes += [{"name": name, "type": "space", "unit": "micrometer"} for name in "zyx"]
+    scale = {"type": "scale", "scale": [1, 1, 2, 0.5, 0.5]}
+    datasets = [{"path": "0", "coordinateTransformations": [scale]}]
+    array = {"zarr_format": 2, "shape": samples.shape, "chunks": [1, 1, 8, 20, 24], "dtype": "|u1",
+             "compressor": None, "fill_value": 0, "order": "C", "filters": None,
+             "dimension_separator": "/"}
+    for time in range(3):
+        for channel in range(2):
+            chunk = path / f"0/{time}/{channel}/0/0/0"
+            chunk.parent.mkdir(parents=True)
+            chunk.write_bytes(samples[time, channel].tobytes())
+    (path / ".zgroup").write_text(json.dumps({"zarr_format": 2}))
+    (path / ".zattrs").write_text(json.dumps(
+        {"multiscales": [{"version": "0.4", "axes": axes, "datasets": datasets}]}
+    ))
+    (path / "0/.zarray").write_text(json.dumps(array))
+    return path, samples
 
 
 def pytest_sessionfinish(session, exitstatus):

@@ -62,4 +62,10 @@ def test_pip_installs_what_runs(tmp_path):
     (tmp_path / "work").mkdir()
     run(python, "-c", PROGRAM, cwd=tmp_path / "work", env={"PREFIX": str(tmp_path / "venv")})
     installed = next((tmp_path / "venv").rglob("site-packages/isobrick"))
-    assert (installed / "py.typed").exists() and (installed / "_isobrick.pyi").exists()
+    for name in ("py.typed", "_isobrick.pyi", "napari.yaml"):
+        assert (installed / name).exists(), name
+    assert (tmp_path / "venv/share/isobrick/paraview/isobrick.xml").exists()
+    entries = run(python, "-c", "import importlib.metadata as m; print([e.value for e in "
+                  "m.distribution('isobrick').entry_points if e.group == 'napari.manifest'])",
+                  cwd=tmp_path / "work")
+    assert "isobrick:napari.yaml" in entries

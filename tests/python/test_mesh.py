@@ -77,16 +77,25 @@ def test_vtk():
     pytest.importorskip("vtkmodules.vtkCommonDataModel")
     from vtkmodules.util.numpy_support import vtk_to_numpy
 
-    mesh = isobrick.extract(ball(), 1, normals=True)
+    mesh = isobrick.extract(ball(), 1, normals=True, unit="mm")
     vertices, faces, normals = mesh.vertices.copy(), mesh.faces.copy(), mesh.normals.copy()
     data = mesh.to_vtk()
-    del mesh
+    corners = vtk_to_numpy(data.GetPolys().GetConnectivityArray())
+    for shared, array in ((vtk_to_numpy(data.GetPoints().GetData()), mesh.vertices),
+                          (vtk_to_numpy(data.GetPointData().GetNormals()), mesh.normals),
+                          (corners, mesh.faces)):
+        assert shared.ctypes.data == array.ctypes.data
+    assert data.GetFieldData().GetAbstractArray("unit").GetValue(0) == "millimeter"
+    del mesh, corners, shared, array
     gc.collect()
     garbage = [isobrick.extract(ball(), i, normals=True) for i in range(3)]
     assert np.array_equal(vtk_to_numpy(data.GetPoints().GetData()), vertices)
     assert np.array_equal(vtk_to_numpy(data.GetPointData().GetNormals()), normals)
     assert np.array_equal(vtk_to_numpy(data.GetPolys().GetConnectivityArray()).reshape(-1, 3), faces)
     assert data.GetNumberOfCells() == len(faces)
+    assert data.GetCell(5).GetPointIds().GetId(1) == faces[5, 1]
+    empty = isobrick.extract(ball(), 1000, normals=True).to_vtk()
+    assert empty.GetNumberOfCells() == 0 and empty.GetNumberOfPoints() == 0
     del garbage
 
 
