@@ -31,7 +31,7 @@ py::dict describe(const StoreInfo& info) {
   py::list levels;
   for (const LevelInfo& level : info.levels) levels.append(describe_level(level));
   py::dict dict;
-  dict["path"] = info.path.string();
+  dict["path"] = info.name;
   dict["shape"] = info.levels.front().lattice.extent;
   dict["dtype"] = info.type;
   add_transform(dict, info.levels.front().transform);
