@@ -301,18 +301,26 @@ def _export_format(path):
     return formats[extension]
 
 
+def _zarr_path(source):
+    """The path of an array or a group of zarr."""
+    kind = type(source.store).__name__
+    folder = getattr(source.store, "path", None) or getattr(source.store, "root", None)
+    if kind == "ZipStore" and not source.path:
+        return str(folder)
+    if folder is None or kind not in (
+        "DirectoryStore", "NestedDirectoryStore", "FSStore", "LocalStore",
+    ):
+        raise UsageError(
+            f"this array or group of zarr in a {kind} is not on the disk; isobrick.extract takes "
+            "arrays of zarr"
+        )
+    return os.path.join(str(folder), source.path)
+
+
 def source_path(source):
     """The path of a file, or of a Zarr array or group on the disk."""
     if hasattr(source, "store") and hasattr(source, "path") and hasattr(source, "attrs"):
-        folder = getattr(source.store, "path", None) or getattr(source.store, "root", None)
-        if folder is None or type(source.store).__name__ not in (
-            "DirectoryStore", "NestedDirectoryStore", "FSStore", "LocalStore",
-        ):
-            raise UsageError(
-                f"a {type(source.store).__name__} of zarr is not on the disk; isobrick.extract "
-                "takes its arrays"
-            )
-        source = os.path.join(str(folder), source.path)
+        source = _zarr_path(source)
     path = path_text(source)
     # The name of an array may follow that of its file: run.h5:/density.
     ends = [i for i in range(len(path)) if path.startswith(":/", i)] + [len(path)]
@@ -369,7 +377,7 @@ def open(
     Parameters
     ----------
     source : str, path, or a zarr array or group on the disk
-        A store, a file of a known format, a folder of slices, FILE:/NAME for an array in a file.
+        A store or a zip of one, a file of a known format, a folder of slices, FILE:/NAME for an array in a file.
     cache : bool or path
         Where stores of other formats are kept: True for ~/.cache/isobrick, or a folder. False:
         they go with the volume.

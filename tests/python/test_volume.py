@@ -1,6 +1,7 @@
 """Volumes in stores and files."""
 
 import gc
+import zipfile
 
 import numpy as np
 import pytest
@@ -133,6 +134,18 @@ def test_zarr_on_the_disk(store, tmp_path, samples):
     assert same(volume.extract(127.5), isobrick.extract(samples, 127.5))
     with pytest.raises(ValueError, match="not on the disk"):
         isobrick.open(zarr.array(samples))
+
+
+def test_a_store_in_a_zip(store, samples):
+    zip = store.with_name("gyroid.zarr.zip")
+    with zipfile.ZipFile(zip, "w", zipfile.ZIP_STORED) as archive:
+        for file in store.rglob("*"):
+            if file.is_file():
+                archive.write(file, file.relative_to(store))
+    volume = isobrick.open(zip)
+    assert same(volume.extract(127.5), isobrick.extract(samples, 127.5))
+    assert np.array_equal(volume.read(), samples)
+    assert isobrick.info(zip)["is_store"] and isobrick.verify(zip)["whole"]
 
 
 def test_what_is_no_volume(tmp_path):
