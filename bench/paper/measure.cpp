@@ -77,8 +77,8 @@ class Measurement {
     });
     soup = {};
     out["brute_s"] = contour([&](double, std::vector<TileWork>& tiles) { all_tiles(tiles); });
-    out["triangles"] = extractor_.triangles();
-    out["vertices"] = extractor_.vertices();
+    out["triangles"] = extractor_.report().triangles;
+    out["vertices"] = extractor_.report().vertices;
     out["active_cells_percent"] = 100.0 * static_cast<double>(count_active_cells()) /
                                   static_cast<double>(std::max<Index>(1, volume(cells)));
     blocks(out["blocks"]);

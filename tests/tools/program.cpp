@@ -45,7 +45,7 @@ Channel open_terminal() {
     close(ours);
     throw std::runtime_error("openpt");
   }
-  const int theirs = open(ptsname(ours), O_RDWR | O_NOCTTY | O_CLOEXEC);
+  const int theirs = ::open(ptsname(ours), O_RDWR | O_NOCTTY | O_CLOEXEC);
   if (theirs < 0) {
     close(ours);
     throw std::runtime_error("open of the terminal");
