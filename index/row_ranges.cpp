@@ -72,7 +72,7 @@ bool merge(const RowBundle& bundle, T* lo, T* hi) {
   return nan != 0;
 }
 
-bool MergeRows(ScalarType type, const RowBundle& bundle, void* lo, void* hi) {
+bool merge_of_type(ScalarType type, const RowBundle& bundle, void* lo, void* hi) {
   return visit_scalar(type, [&](auto tag) {
     using T = typename decltype(tag)::type;
     return merge(bundle, static_cast<T*>(lo), static_cast<T*>(hi));
@@ -87,7 +87,7 @@ HWY_AFTER_NAMESPACE();
 namespace isobrick {
 
 bool merge_rows(ScalarType type, const RowBundle& bundle, void* lo, void* hi) {
-  static const auto best = ISOBRICK_BEST_OF(MergeRows);
+  static const auto best = ISOBRICK_BEST_OF(merge_of_type);
   return best(type, bundle, lo, hi);
 }
 
