@@ -87,9 +87,9 @@ struct CpuExtractor::Impl {
 
   void gather(TileState& state, const TileSamples& samples) const {
     state.samples.resize(TileLayout::kSize * lattice.sample_bytes());
-    samples.gather(state.work, sample_reach(options),
-                   {state.samples.data(), TileLayout::kOrigin, TileLayout::kRow,
-                    TileLayout::kPlane});
+    samples.gather(
+        state.work, sample_reach(options),
+        {state.samples.data(), TileLayout::kOrigin, TileLayout::kRow, TileLayout::kPlane});
   }
 
   void count(TileState& state, const TileWork& work, const TileSamples& samples) const {

@@ -48,8 +48,7 @@ void GridExtractor::find_inside(const GridView& g) {
 }
 
 template <int axis>
-void GridExtractor::add_vertices(const GridView& g, int y, int z, Bits active_edges,
-                                 Mesh& out) {
+void GridExtractor::add_vertices(const GridView& g, int y, int z, Bits active_edges, Mesh& out) {
   Plane& plane = planes_[static_cast<std::size_t>(z & 1)];
   std::uint32_t* numbers = plane.data() + (axis * kGridPoints + y) * kGridPoints;
   auto next = static_cast<std::uint32_t>(out.positions.size());

@@ -24,7 +24,7 @@ std::vector<TileWork> active_tiles(const Field<T>& field, double isovalue) {
 /// The mesh that those from a device are compared with.
 template <class T>
 isobrick::Mesh on_cpu(const Field<T>& field, const Lattice& lattice, const BrickLookup& bricks,
-                  const SurfaceOptions& options) {
+                      const SurfaceOptions& options) {
   const std::vector<TileWork> tiles = active_tiles(field, options.isovalue);
   CpuExtractor extractor(lattice, options, {});
   extractor.extract(tiles, bricks, nullptr);

@@ -55,6 +55,8 @@ def test_pip_installs_what_runs(tmp_path):
     for name in ("CMakeLists.txt", "LICENSE", "README.md", "pyproject.toml", "setup.py"):
         shutil.copy(ROOT / name, source)
     shutil.copytree(ROOT / "python", source / "python")
+    (source / "include/isobrick").mkdir(parents=True)
+    shutil.copy(ROOT / "include/isobrick/version.h", source / "include/isobrick")
     run(sys.executable, "-m", "venv", "--system-site-packages", tmp_path / "venv")
     python = tmp_path / "venv" / "bin" / "python"
     run(python, "-m", "pip", "install", "--no-build-isolation", "--no-deps", "--no-index",

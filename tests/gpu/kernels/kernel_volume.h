@@ -20,8 +20,8 @@ namespace isobrick::testing {
 
 /// The CPU's mesh, with one thread: ThreadSanitizer does not know what TBB does.
 template <class T>
-isobrick::Mesh expected_mesh(const Field<T>& field, const Lattice& lattice, const BrickLookup& bricks,
-                         SurfaceOptions options, double isovalue) {
+isobrick::Mesh expected_mesh(const Field<T>& field, const Lattice& lattice,
+                             const BrickLookup& bricks, SurfaceOptions options, double isovalue) {
   options.isovalue = isovalue;
   return tbb::task_arena(1).execute([&] { return on_cpu(field, lattice, bricks, options); });
 }

@@ -155,7 +155,8 @@ void compare(const Field<T>& field, const Lattice& lattice, const BrickLookup& b
     SCOPED_TRACE(std::to_string(tiles_of_launch) + " tiles a launch" +
                  (normals ? ", normals" : ""));
     options.normals = normals;
-    const isobrick::Mesh expected = expected_mesh(field, lattice, bricks, options, options.isovalue);
+    const isobrick::Mesh expected =
+        expected_mesh(field, lattice, bricks, options, options.isovalue);
     ASSERT_GT(expected.triangles.size(), 0u);
     std::vector<TileWork> tiles = active_tiles(field, options.isovalue);
     if (options.may_have_nan)
