@@ -11,8 +11,7 @@ namespace isobrick::detail {
 namespace {
 
 constexpr std::size_t kLargePage = std::size_t{2} << 20;
-/// Where rounding to large pages wastes little.
-constexpr std::size_t kLarge = 16 * kLargePage;
+static_assert(kLargeMemory % kLargePage == 0);
 constexpr std::size_t kAlignment = 64;
 
 std::size_t whole_pages(std::size_t bytes) {
@@ -55,11 +54,11 @@ void* move_pages(void* data, std::size_t old_bytes, std::size_t bytes) {
 
 void* grow_memory(std::pmr::memory_resource* memory, void* data, std::size_t used,
                   std::size_t old_capacity, std::size_t capacity) {
-  if (!memory && capacity < kLarge) {
+  if (!memory && capacity < kLargeMemory) {
     void* const grown = std::realloc(data, capacity);
     return grown ? grown : throw std::bad_alloc();
   }
-  if (!memory && old_capacity >= kLarge)
+  if (!memory && old_capacity >= kLargeMemory)
     return move_pages(data, whole_pages(old_capacity), whole_pages(capacity));
   void* const grown =
       memory ? memory->allocate(capacity, kAlignment) : map_pages(whole_pages(capacity));
@@ -72,7 +71,7 @@ void free_memory(std::pmr::memory_resource* memory, void* data, std::size_t capa
   if (!data) return;
   if (memory)
     memory->deallocate(data, capacity, kAlignment);
-  else if (capacity < kLarge)
+  else if (capacity < kLargeMemory)
     std::free(data);
   else
     munmap(data, whole_pages(capacity));

@@ -9,6 +9,9 @@
 namespace isobrick {
 namespace detail {
 
+/// Bytes from which memory of the process lies in large pages: their rounding wastes little then.
+inline constexpr std::size_t kLargeMemory = std::size_t{32} << 20;
+
 /// Memory of `capacity` bytes, which begins with the first `used` bytes of `data`. Frees `data`, of
 /// `old_capacity` bytes or null. Of `memory`, or of the process where that is null. Throws
 /// std::bad_alloc; `data` is as it was then.

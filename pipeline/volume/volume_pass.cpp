@@ -49,14 +49,22 @@ Box3 blocks_of(Box3 tiles, const Lattice& lattice) {
   return intersect({tiles.lo * blocks, tiles.hi * blocks}, {{0, 0, 0}, lattice.blocks()});
 }
 
+/// Makes room for `count` elements, in large pages unless one of these is more than that.
+template <class T>
+void reserve(std::size_t count, PodBuffer<T>& buffer) {
+  constexpr std::size_t worth = detail::kLargeMemory / 8 / sizeof(T);
+  constexpr std::size_t large = detail::kLargeMemory / sizeof(T) + 1;
+  buffer.reserve(count < worth ? count : std::max(count, large));
+}
+
 /// Makes room for the mesh of so many active blocks, as smooth surfaces have it. In memory of the
 /// process this takes addresses only, until the mesh is written; of a resource it would take all.
 void reserve(std::size_t blocks, bool normals, Mesh& mesh) {
   constexpr std::size_t vertices = 1024, triangles = 2048;
   if (mesh.positions.memory()) return;
-  mesh.positions.reserve(blocks * vertices);
-  if (normals) mesh.normals.reserve(blocks * vertices);
-  mesh.triangles.reserve(blocks * triangles);
+  reserve(blocks * vertices, mesh.positions);
+  if (normals) reserve(blocks * vertices, mesh.normals);
+  reserve(blocks * triangles, mesh.triangles);
 }
 
 std::size_t count_blocks(const std::vector<TileWork>& tiles) {
