@@ -41,29 +41,29 @@ class PictureMemory : public ProgramTest {
 TEST_F(PictureMemory, OfAMeshFile) {
   for (const char* name : {"m.ply", "m.stl", "m.obj"}) {
     run_json({"extract", store(), "--isovalue", "127.5", "-o", path(name)});
-    expect_least_holds({"render", path(name), "-o", path("m.png"), "--size", "400x300"}, 224);
+    expect_least_holds({"render", path(name), "-o", path("m.png"), "--size", "400x300"}, 252);
   }
   expect_least_holds({"render", path("m.ply"), "-o", path("m.png"), "--size", "400x300",
                       "--opacity", "0.5", "--box", "--axes", "--scale-bar", "--clip", "1,0,0,50"},
-                     224);
+                     252);
 }
 
 TEST_F(PictureMemory, OfAPreview) {
   expect_least_holds({"extract", store(), "--isovalue", "127.5", "--threads", "2", "-o",
                       path("m.ply"), "--preview", path("p.png"), "--size", "400x300"},
-                     224);
+                     252);
 }
 
 TEST_F(PictureMemory, OfPreviewsOfSeveralIsovalues) {
   expect_least_holds({"extract", store(), "--isovalue", "110", "--isovalue", "127.5", "--isovalue",
                       "140", "--threads", "2", "--preview", path("p.png"), "--size", "400x300"},
-                     224);
+                     252);
 }
 
 TEST_F(PictureMemory, OfAView) {
   expect_least_holds({"view", store(), "--isovalue", "127.5", "--screenshot", path("v.png"),
                       "--size", "400x300", "--threads", "2"},
-                     224);
+                     252);
 }
 
 TEST_F(PictureMemory, OfASceneOfManyValues) {
