@@ -14,10 +14,6 @@ if(epoxy_FOUND AND imgui_FOUND AND TARGET glm::glm AND TARGET glfw AND ISOBRICK_
 else()
   set(isobrick_viewer_found OFF)
 endif()
-option(ISOBRICK_VIEWER "Draw pictures and show volumes with OpenGL" ${isobrick_viewer_found})
-set(isobrick_viewer_needs "libepoxy, GLM, GLFW, Dear ImGui, stb or DejaVuSans.ttf")
-if(ISOBRICK_VIEWER AND NOT isobrick_viewer_found)
-  message(FATAL_ERROR "ISOBRICK_VIEWER is on, but ${isobrick_viewer_needs} was not found")
-elseif(NOT ISOBRICK_VIEWER)
-  message(STATUS "${isobrick_viewer_needs} not found, or turned off: no pictures, no viewer")
-endif()
+isobrick_found_option(ISOBRICK_VIEWER "Draw pictures and show volumes with OpenGL"
+  ${isobrick_viewer_found} "libepoxy, GLM, GLFW, Dear ImGui, stb or DejaVuSans.ttf"
+  "no pictures, no viewer")

@@ -1,11 +1,11 @@
 """The reader of napari, which napari.yaml names: volumes as multiscale images."""
 
-import operator
 import os
 
 import numpy as np
 
 from ._errors import Error
+from ._indexing import read_indexed
 from ._operations import info
 from ._volume import open as open_volume
 
@@ -32,31 +32,9 @@ class LevelArray:
 
     def __getitem__(self, index):
         """Samples by slices, steps and integers, as a new array. Reads the box that covers them."""
-        parts = index if isinstance(index, tuple) else (index,)
-        places = [i for i, part in enumerate(parts) if part is Ellipsis]
-        if places:
-            at = places[0]
-            parts = parts[:at] + (slice(None),) * (4 - len(parts)) + parts[at + 1 :]
-        if len(parts) > 3:
-            raise IndexError(f"a level has three axes [z, y, x], not {len(parts)}")
-        parts += (slice(None),) * (3 - len(parts))
-        box, within, extent = [], [], []
-        for part, size in zip(parts, self.shape):
-            if isinstance(part, slice):
-                chosen = range(*part.indices(size))
-                extent.append(len(chosen))
-                lo, hi = min(chosen, default=0), max(chosen, default=-1)
-                box.append(slice(lo, hi + 1))
-                within.append(slice(None, None, part.step))
-                continue
-            place = operator.index(part)
-            if not -size <= place < size:
-                raise IndexError(f"index {place} is outside of an axis of {size} samples")
-            box.append(slice(place % size, place % size + 1))
-            within.append(0)
-        if 0 in extent:
-            return np.empty(extent, self.dtype)
-        return self._volume.read(self._level, tuple(box))[tuple(within)]
+        return read_indexed(
+            index, self.shape, self.dtype, lambda box: self._volume.read(self._level, box)
+        )
 
 
 def reader_of(path):

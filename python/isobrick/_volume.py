@@ -1,7 +1,6 @@
 """Volumes in files: stores, and whatever else the program opens."""
 
 import errno
-import operator
 import os
 from dataclasses import dataclass
 
@@ -13,6 +12,7 @@ from ._arguments import (
     path_text, slices_of, thread_count,
 )
 from ._errors import UsageError
+from ._indexing import read_indexed
 from ._mesh import Mesh
 from ._progress import reporting
 
@@ -235,25 +235,8 @@ class Volume:
         return self._native.read(level, box, thread_count(threads))
 
     def __getitem__(self, index):
-        """Samples of level 0 by slices without steps and integers, as a new array."""
-        parts = index if isinstance(index, tuple) else (index,)
-        if Ellipsis in [part for part in parts if part is Ellipsis]:
-            at = parts.index(Ellipsis)
-            parts = parts[:at] + (slice(None),) * (4 - len(parts)) + parts[at + 1 :]
-        if len(parts) > 3:
-            raise IndexError(f"a volume has three axes [z, y, x], not {len(parts)}")
-        slices, scalars = [], []
-        for part, size in zip(parts, self.shape):
-            if isinstance(part, slice):
-                slices.append(part)
-                scalars.append(slice(None))
-                continue
-            place = operator.index(part)
-            if not -size <= place < size:
-                raise IndexError(f"index {place} is outside of an axis of {size} samples")
-            slices.append(slice(place % size, place % size + 1))
-            scalars.append(0)
-        return self.read(0, tuple(slices))[tuple(scalars)]
+        """Samples of level 0 by slices and integers, as a new array. Reads what covers them."""
+        return read_indexed(index, self.shape, self.dtype, lambda box: self.read(0, box))
 
     def export(
         self, path, *, level=0, roi=None, format=None, isovalue=None, half_band=3, inside=None,
