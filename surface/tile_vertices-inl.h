@@ -132,7 +132,7 @@ template <class T>
 struct FloatSamples {
   using Values = VF;
 
-  /// Samples at lane-wise offsets. Narrow ones are fetched four bytes at a time,
+  /// Samples at these offsets. Narrow ones are fetched four bytes at a time,
   /// which the layout leaves room for.
   static HWY_INLINE Values load(const T* base, VI offset) {
     const F f;

@@ -10,6 +10,7 @@
 
 #include <isobrick/error.h>
 #include <isobrick/mesh_sinks.h>
+#include "tests/pipeline/convert_store.h"
 #include "tests/surface/field.h"
 
 namespace isobrick {
@@ -251,6 +252,67 @@ TEST(VolumeExtractor, SinksGetTheMesh) {
   EXPECT_EQ(vertices, expected.positions.size());
   EXPECT_EQ(triangles, expected.triangles.size());
   EXPECT_GT(chunks, 1u);
+}
+
+/// Keeps what is known before the first chunk.
+class HeaderSink final : public MeshSink {
+ public:
+  Indexing indexing() const override { return Indexing::welded; }
+  void begin(const MeshHeader& header) override { header_ = header; }
+  void write(const MeshChunk&) override {}
+  void finish() override {}
+  std::uint64_t bytes() const override { return 0; }
+  MeshHeader header_;
+};
+
+void expect_same_header(const MeshHeader& header, const MeshHeader& expected) {
+  EXPECT_EQ(header.has_normals, expected.has_normals);
+  EXPECT_EQ(header.world_lo, expected.world_lo);
+  EXPECT_EQ(header.world_hi, expected.world_hi);
+  EXPECT_EQ(header.unit, expected.unit);
+  ASSERT_TRUE(header.surface && expected.surface);
+  EXPECT_EQ(header.surface->lo, expected.surface->lo);
+  EXPECT_EQ(header.surface->hi, expected.surface->hi);
+}
+
+TEST(VolumeExtractor, GivesWhatAStoreOfTheSameSamplesGives) {
+  const auto field = noise_with_calm<std::int16_t>({75, 50, 67});
+  test::MemorySource source(field.extent, ScalarType::i16, test::as_bytes(field.samples));
+  Transform& transform = source.mutable_info().transform;
+  transform.spacing = {0.5, 1, 2};
+  transform.origin = {-3, 8, 1e3};
+  transform.direction = {0, -1, 0, 1, 0, 0, 0, 0, 1};
+  transform.unit = "micrometer";
+  const test::TemporaryFolder folder;
+  test::convert_quietly(source, folder / "s.zarr", {});
+  const StoreReader store(folder / "s.zarr");
+  Volume volume = volume_of(field);
+  volume.transform = transform;
+  VolumeExtractor by_source(source);
+  for (const std::optional<Box3> roi :
+       {std::optional<Box3>(), std::optional(Box3{{40, 3, 20}, {75, 47, 60}})}) {
+    const ExtractOptions options{.isovalue = 42, .roi = roi, .normals = true};
+    const Mesh expected = extract(store, options);
+    const testing::Mesh arrays{{expected.positions.begin(), expected.positions.end()},
+                               {expected.normals.begin(), expected.normals.end()},
+                               {expected.triangles.begin(), expected.triangles.end()},
+                               0};
+    ASSERT_FALSE(expected.triangles.empty());
+    Mesh mesh = extract(volume, options);
+    EXPECT_TRUE(same(mesh, arrays));
+    EXPECT_EQ(mesh.unit, expected.unit);
+    by_source.extract(options, mesh);
+    EXPECT_TRUE(same(mesh, arrays));
+    HeaderSink of_store, of_volume;
+    extract(store, options, of_store);
+    extract(volume, options, of_volume);
+    expect_same_header(of_volume.header_, of_store.header_);
+  }
+}
+
+TEST(VolumeExtractor, StreamsThatPassOnceAreRefused) {
+  auto source = test::make_source<float>({8, 8, 8}, 1, false, false);
+  EXPECT_THROW(VolumeExtractor{source}, UsageError);
 }
 
 /// Counts what is taken of it and not given back.
