@@ -21,7 +21,7 @@
 #include "bricks/stored_index.h"
 #include "stream/tile_stream.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 namespace fs = std::filesystem;

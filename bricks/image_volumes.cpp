@@ -5,7 +5,7 @@
 #include <isobrick/storage.h>
 #include "bricks/zarr/metadata_files.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 std::optional<Index>& place_on(const VolumeAxis& axis, Selection& selection) {
   // An axis without a role takes what was given.

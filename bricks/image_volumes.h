@@ -6,7 +6,7 @@
 
 #include "bricks/zarr/volume_choice.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// The volumes of an image, and which of them is meant.
 struct ImageVolumes {

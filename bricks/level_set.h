@@ -6,7 +6,7 @@
 #include <isobrick/inside.h>
 #include <isobrick/store_reader.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Whether the samples are signed distances, negative inside.
 inline bool is_level_set(const StoreInfo& info) { return info.grid_class == "level set"; }

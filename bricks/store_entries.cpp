@@ -19,7 +19,7 @@
 #include "io/bytes/leftovers.h"
 #include "io/bytes/output_guard.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 namespace fs = std::filesystem;

@@ -9,7 +9,7 @@
 #include <isobrick/level_info.h>
 #include "bricks/zarr/array_metadata.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Which files and folders a store of ours has: its levels, and of each the chunks that lie within
 /// its grids.

@@ -10,7 +10,7 @@
 #include "bricks/zarr/ome_transformations.h"
 #include "bricks/zarr/zarr_v2.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 nlohmann::json marker_json(const StoreLayout& layout) {

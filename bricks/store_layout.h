@@ -12,7 +12,7 @@
 #include "bricks/zarr/array_metadata.h"
 #include "bricks/zarr/codec.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Everything that the metadata of a store will hold. All levels share type and codec.
 struct StoreLayout {

@@ -22,7 +22,7 @@
 #include "bricks/zarr/volume_choice.h"
 #include "core/shell_word.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 using Clock = std::chrono::steady_clock;

@@ -23,7 +23,7 @@
 #include "io/bytes/file.h"
 #include "io/bytes/folder_walk.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 // Shards being written keep their file open while there are no more than so

@@ -13,7 +13,7 @@
 #include "bricks/ranges/stored_histogram.h"
 #include "bricks/store_layout.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Writes a store into a directory: bricks into shard files under temporary
 /// names, metadata last. Bricks are given encoded, so encoding runs on any

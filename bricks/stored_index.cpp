@@ -10,7 +10,7 @@
 #include "bricks/zarr/json_reader.h"
 #include "bricks/zarr/store_names.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 static_assert(IndexLayout::kBrick * IndexLayout::kChunk == StoreReader::kRangeChunk * kBlockEdge);
 

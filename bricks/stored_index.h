@@ -9,7 +9,7 @@
 #include "bricks/ranges/index_chunk.h"
 #include "bricks/ranges/index_layout.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Where an index of a level lies in a store, below `additions`: both are keys.
 std::string index_folder(const std::string& additions, int level, const std::string& kind);

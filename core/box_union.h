@@ -5,7 +5,7 @@
 
 #include <isobrick/vec.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Widens the box between two corners to hold another one.
 template <class T>

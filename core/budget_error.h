@@ -2,7 +2,7 @@
 
 #include <isobrick/error.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Something would take more memory than its part of the budget.
 class BudgetError : public UsageError {

@@ -3,7 +3,7 @@
 #include <atomic>
 
 // How a signal reaches code that waits for input and cannot report progress.
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace detail {
 inline std::atomic<bool> cancel_requested{false};
 static_assert(std::atomic<bool>::is_always_lock_free, "signal handlers need that");

@@ -5,7 +5,7 @@
 #include <isobrick/error.h>
 #include <isobrick/progress.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Passes everything on, and throws Cancelled in place of it once a stop is requested.
 class CancellableProgress final : public Progress {

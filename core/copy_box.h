@@ -5,7 +5,7 @@
 
 #include <isobrick/vec.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Samples of a box, dense in C order [z, y, x].
 template <class Byte>

@@ -5,7 +5,7 @@
 
 #include <isobrick/vec.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// How far the rows and the planes of a box of samples are apart, in bytes.
 struct RowStrides {

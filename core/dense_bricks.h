@@ -6,7 +6,7 @@
 #include <isobrick/lattice.h>
 #include "core/copy_box.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// A volume in memory, cut into bricks: for data that is small or already
 /// there, for tests and for measuring. Bricks lie one after the other.

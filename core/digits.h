@@ -2,7 +2,7 @@
 
 #include <string_view>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Whether `text` is one decimal digit or more, and nothing else.
 inline bool is_digits(std::string_view text) {

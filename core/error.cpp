@@ -2,7 +2,7 @@
 
 #include <system_error>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 Error system_error(const std::string& what, const std::string& path, int errno_value) {
   return Error("cannot " + what + " '" + path +

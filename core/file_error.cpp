@@ -5,7 +5,7 @@
 
 #include <isobrick/error.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 std::string error_message(const std::exception& error) {
   const auto* of_system = dynamic_cast<const std::system_error*>(&error);

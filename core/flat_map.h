@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// What FlatMap needs of keys: one that is never used, and a number that differs for most keys.
 template <class Key>

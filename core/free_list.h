@@ -5,7 +5,7 @@
 #include <optional>
 #include <vector>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Which parts of [0, size) are free; the first that is large enough is taken.
 class FreeList {

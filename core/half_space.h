@@ -4,7 +4,7 @@
 
 #include <isobrick/vec.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// What lies on one side of a plane of world space: dot(normal, p) >= least. The normal
 /// points inwards and is of any length but 0.

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <iterator>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// A unit of length; picometers make the factors between the usual ones exact.

@@ -4,7 +4,7 @@
 #include <string>
 #include <string_view>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 // Units of length: their names, which are those of OME-Zarr ("micrometer"), and
 // what else they are called. Text is UTF-8.

@@ -12,7 +12,7 @@
 #include <sstream>
 #include <string>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 namespace fs = std::filesystem;

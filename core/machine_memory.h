@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <string_view>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Bytes of memory that this process may use: what the machine has, or less where its control
 /// group (version 1 or 2, with those around it) or a resource limit allows less.

@@ -5,7 +5,7 @@
 
 #include "core/free_list.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// The part of a block of vertices and triangles that a mesh has.
 struct MeshRange {

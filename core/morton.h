@@ -4,7 +4,7 @@
 
 #include <isobrick/vec.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Z-order code of a point with coordinates in [0, 2²¹): x in the lowest bit.
 /// Monotone in every coordinate, so a point comes after all its lower neighbours.

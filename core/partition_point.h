@@ -4,7 +4,7 @@
 
 #include "core/host_device.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// How many of 0, 1, … n − 1 satisfy a condition that holds up to some number and for none from
 /// there on: a binary search.

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 std::string printable(std::string_view text, std::size_t most) {
   std::string shown(text.substr(0, most));

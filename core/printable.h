@@ -4,7 +4,7 @@
 #include <string>
 #include <string_view>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// The first `most` characters of what somebody else wrote, fit for a line of a message:
 /// everything but printable ASCII becomes '?'.

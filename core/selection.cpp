@@ -4,7 +4,7 @@
 
 #include <isobrick/error.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 Index choose(const std::string& path, const char* option, Index count,
              std::optional<Index> chosen) {

@@ -3,7 +3,7 @@
 #include <string>
 #include <string_view>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// `text` as one word of a shell's command line, for commands in messages.
 inline std::string shell_word(std::string_view text) {

@@ -7,7 +7,7 @@
 // dispatch would do the same, but it links libhwy, which times its clock for 5 ms whenever a
 // program starts.
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// What this processor has of what functions are compiled for, from the least to the most.
 enum class SimdLevel { baseline, sse4, avx2, avx3, avx3_dl };

@@ -2,7 +2,7 @@
 
 #include <chrono>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Measures steps that follow each other, or adds the time of a scope to a sum.
 class Stopwatch {

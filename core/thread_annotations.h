@@ -28,7 +28,7 @@
 /// A function that gives the locks back.
 #define ISOBRICK_RELEASE(...) ISOBRICK_THREAD_ANNOTATION(release_capability(__VA_ARGS__))
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// std::mutex, known to the analysis.
 class ISOBRICK_CAPABILITY("mutex") Mutex {

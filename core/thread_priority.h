@@ -2,7 +2,7 @@
 
 #include <sys/resource.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Gives the calling thread, and threads that it starts later, a lower share of busy cores, for
 /// good. For workers beside a thread that draws.

@@ -6,7 +6,7 @@
 
 #include "core/host_device.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// An isovalue as a comparison in the sample type T: the smallest T that is not
 /// below it. Then `iso <= sample` is `value <= sample` and `sample < iso` is

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <mutex>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// A fair mutex: threads get it in the order in which they called lock().
 class TicketLock {

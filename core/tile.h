@@ -6,7 +6,7 @@
 
 #include <isobrick/lattice.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// A tile that the isovalue touches, and which of its 2×2×2 blocks of 16³ cells
 /// do it (bit = x + 2·y + 4·z).

@@ -4,7 +4,7 @@
 
 #include <isobrick/vec.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 inline double length(Vec3d v) { return std::sqrt(dot(v, v)); }
 

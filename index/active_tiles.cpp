@@ -2,7 +2,7 @@
 
 #include "core/morton.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 template <class T>
 void append_active_tiles(Box3 blocks, std::span<const ValueRange<T>> ranges, double isovalue,

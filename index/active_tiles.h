@@ -6,7 +6,7 @@
 #include <isobrick/range.h>
 #include "core/tile.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Appends the tiles with an active block, in Morton order, found by a linear
 /// scan. `blocks` is a box of 16³ blocks whose low corner lies on a tile;

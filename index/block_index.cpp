@@ -7,7 +7,7 @@
 #include "index/instantiate.h"
 #include "index/span_index.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 constexpr Index kEdge = kTileEdge / kBlockEdge;

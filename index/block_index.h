@@ -9,7 +9,7 @@
 #include <isobrick/range.h>
 #include "core/tile.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// The blocks of 16³ cells of a volume in memory, searched through one of the
 /// span-space structures. Numbered tile by tile in Morton order, so that the mask

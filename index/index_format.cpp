@@ -7,7 +7,7 @@
 #include <isobrick/error.h>
 #include "index/span_index.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 namespace index_detail {
 

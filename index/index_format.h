@@ -16,7 +16,7 @@
 // a multiple of 8. Where an array lies follows from the counts in the header, so
 // no offset into the block is ever stored. docs/reference/index_format.md has the layouts.
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 static_assert(std::endian::native == std::endian::little, "index bytes are used as they lie");
 

@@ -5,7 +5,7 @@
 #include "index/instantiate.h"
 #include "index/span_items.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 using namespace index_detail;
 

@@ -9,7 +9,7 @@
 #include "core/host_device.h"
 #include "index/index_format.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Edelsbrunner's interval tree. Its nodes are the split values in ascending
 /// order, as a balanced search tree without links: node r of 1 … nodes is the

@@ -8,7 +8,7 @@
 #include "core/host_device.h"
 #include "index/index_format.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// A balanced k-d tree in span space with nothing but the items, in tree order:
 /// the node of the places [begin, end) is its middle item, before it lie those

@@ -6,7 +6,7 @@
 #include <isobrick/error.h>
 #include "index/instantiate.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// Least and largest samples of several rows, place by place. The loops are such

@@ -5,7 +5,7 @@
 #include <isobrick/range.h>
 #include <isobrick/vec.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// A box of samples somewhere in memory, x next to each other.
 template <class T>

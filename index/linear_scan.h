@@ -9,7 +9,7 @@
 #include "core/host_device.h"
 #include "index/index_format.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// All ranges one after the other; an item's id is its place.
 template <class T>

@@ -9,7 +9,7 @@
 #include "core/host_device.h"
 #include "index/index_format.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// The min-max octree over items in a grid, as a pyramid of grids: level 0 has
 /// the items, each further one a node for up to 2×2×2 of the level below (fewer

@@ -8,7 +8,7 @@
 #include "core/host_device.h"
 #include "index/index_format.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// What the points of a quadtree's node have in common, and where they begin.
 template <class T>

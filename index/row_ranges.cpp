@@ -16,7 +16,7 @@
 #include "core/simd_targets.h"
 
 HWY_BEFORE_NAMESPACE();
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace HWY_NAMESPACE {
 
 /// As wide as the samples, so that loops become ones of vectors.
@@ -84,7 +84,7 @@ bool merge_of_type(ScalarType type, const RowBundle& bundle, void* lo, void* hi)
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 bool merge_rows(ScalarType type, const RowBundle& bundle, void* lo, void* hi) {
   static const auto best = ISOBRICK_BEST_OF(merge_of_type);

@@ -7,7 +7,7 @@
 #include <isobrick/scalar.h>
 #include <isobrick/vec.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Rows of samples at equal distances, x next to each other.
 struct RowBundle {

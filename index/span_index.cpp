@@ -7,7 +7,7 @@
 #include "core/threshold.h"
 #include "index/instantiate.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// Converts the isovalue to the items' type once and lets the structure report to `sink`.

@@ -24,7 +24,7 @@
 // Building and querying are single-threaded and share nothing: callers run many
 // at once.
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// The index of `ranges`, whose ids are their places. `grid` gives the extents
 /// of the items for the octree, C order [z, y, x]; {n, 1, 1} where there is no

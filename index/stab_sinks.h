@@ -12,7 +12,7 @@
 //   node()             It visits a node.
 //   tested(n)          It compares the ranges of n items.
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 struct QuietSink {
   void node() {}

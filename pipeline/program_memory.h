@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 inline constexpr std::uint64_t kMiB = std::uint64_t{1} << 20;
 

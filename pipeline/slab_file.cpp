@@ -9,7 +9,7 @@
 
 #include <isobrick/error.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// Calls f(offset in the file, offset in the box, bytes) for each contiguous

@@ -8,7 +8,7 @@
 #include <isobrick/volume_source.h>
 #include "io/bytes/file.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// A raw array on disk, C order [z, y, x], of which boxes are written and read
 /// in any order and by any thread.

@@ -5,7 +5,7 @@
 
 #include <isobrick/vec.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// The largest box with `brick.z` planes to work through a volume in that has
 /// at most `samples` samples: whole rows of bricks if one fits, or a part of a

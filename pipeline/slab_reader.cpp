@@ -10,7 +10,7 @@
 #include "bricks/zarr/codec.h"
 #include "core/copy_box.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// Whether the brick is there.

@@ -7,7 +7,7 @@
 
 #include <isobrick/store_reader.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Receives a brick that cannot be read, and why; called from any thread.
 using BrickFailure = std::function<void(Int3 brick, const std::string& what)>;

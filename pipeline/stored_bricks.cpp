@@ -1,6 +1,6 @@
 #include "pipeline/stored_bricks.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 void for_each_range_file(Box3 bricks, const std::function<void(Box3 part)>& f) {
   constexpr Int3 file{StoreReader::kRangeChunk, StoreReader::kRangeChunk, StoreReader::kRangeChunk};

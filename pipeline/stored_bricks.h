@@ -6,7 +6,7 @@
 #include <isobrick/progress.h>
 #include <isobrick/store_reader.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Calls f(part) for the parts of `bricks`, a box of a level's bricks, whose ranges lie in one
 /// file each.

@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 std::string sample_text(double value, ScalarType type) {
   return type == ScalarType::f32 ? fmt::format("{}", static_cast<float>(value))

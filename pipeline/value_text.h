@@ -5,7 +5,7 @@
 #include <isobrick/range.h>
 #include <isobrick/scalar.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// The fewest digits that read back as this sample of a volume.
 std::string sample_text(double value, ScalarType type);

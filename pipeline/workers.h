@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <utility>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Exactly so many threads for the work of one command, also when that is more
 /// than there are cores; 0 means one a core.

@@ -5,7 +5,7 @@
 
 #include "core/morton.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 std::uint64_t key_of(Int3 brick, Int3 grid) {

@@ -8,7 +8,7 @@
 #include "core/flat_map.h"
 #include "stream/brick_slots.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// A brick and the slot that it is decoded to.
 struct BrickLoad {

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <utility>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// Bytes of the bricks that a thread takes at a time: small bricks come in groups.

@@ -21,7 +21,7 @@
 #include "stream/job_queue.h"
 #include "stream/tile_stream.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 class BatchDecoder;
 

@@ -2,7 +2,7 @@
 
 #include <utility>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 constexpr Index kEdge = StoreReader::kRangeChunk;

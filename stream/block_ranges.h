@@ -9,7 +9,7 @@
 #include "bricks/ranges/lru_cache.h"
 #include "stream/brick_source.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Ranges of 16³ blocks, read in the chunks in which they are stored; the most
 /// recently used stay. Thread-safe.

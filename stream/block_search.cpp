@@ -3,7 +3,7 @@
 #include "index/active_tiles.h"
 #include "stream/index_search.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// Looks at the range of every block.

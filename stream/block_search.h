@@ -10,7 +10,7 @@
 #include <isobrick/store_reader.h>
 #include "core/tile.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// How the active blocks of a level are searched for.
 struct SearchMethod {

@@ -6,7 +6,7 @@
 
 #include "stream/brick_memory.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// Memory grows by some large pages.

@@ -13,7 +13,7 @@
 #include "stream/brick_reader.h"
 #include "stream/brick_slots.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// The bricks of tiles that are extracted together, which stay in place until this is destroyed,
 /// by the cache's thread and before the cache. The caller waits for them in the order in which it

@@ -5,7 +5,7 @@
 #include <cstdlib>
 #include <new>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 std::shared_ptr<std::byte> allocate_bricks(std::size_t bytes) {
   constexpr std::size_t kLargePage = std::size_t{2} << 20;

@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <memory>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Memory for decoded bricks, and their transfer into it. Thread-safe.
 class BrickMemory {

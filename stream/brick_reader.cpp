@@ -6,7 +6,7 @@
 
 #include <isobrick/error.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// Of range tables that are kept: some chunks of them, for bricks come in Morton order.

@@ -6,7 +6,7 @@
 #include <isobrick/store_reader.h>
 #include "bricks/ranges/lru_cache.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Reads bricks of a level and compares them with their stored ranges: a brick that lies at the
 /// place of another, or comes from another store, has a right checksum and makes a wrong mesh. The

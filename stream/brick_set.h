@@ -6,7 +6,7 @@
 
 #include <isobrick/store_reader.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Some of a store's bricks, a bit for each; of levels that are stored, and bricks within their
 /// lattices. One thread at a time changes it; others may call has() meanwhile, without waiting.

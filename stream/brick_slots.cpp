@@ -6,7 +6,7 @@
 
 #include "core/morton.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 Int3 point_of(std::uint64_t key, Int3 grid) {

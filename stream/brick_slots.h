@@ -11,7 +11,7 @@
 #include <isobrick/lattice.h>
 #include "stream/distinct_bricks.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Comes after the code of every tile.
 inline constexpr std::uint64_t kNever = ~std::uint64_t{0};

@@ -5,7 +5,7 @@
 
 #include <isobrick/store_reader.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Where a scene has its samples from. Thread-safe. What StoreReader gives; an
 /// interface so that a scene can be made of anything that has bricks and ranges.

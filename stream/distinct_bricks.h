@@ -6,7 +6,7 @@
 
 #include <isobrick/lattice.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Counts the different bricks of a lattice among those that are added, with a bit for each.
 class DistinctBricks {

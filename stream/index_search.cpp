@@ -10,7 +10,7 @@
 #include "core/morton.h"
 #include "index/span_index.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 constexpr Index kBrickBlocks = IndexLayout::kBrick / kBlockEdge;

@@ -9,7 +9,7 @@
 #include "index/index_format.h"
 #include "stream/block_search.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// A decoded part of an index chunk: checked, and the index of `grid` that its
 /// layout requires. Throws DamageError with what is wrong, not where.

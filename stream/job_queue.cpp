@@ -2,7 +2,7 @@
 
 #include <utility>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 void JobQueue::push(Job job) {
   {

@@ -5,7 +5,7 @@
 #include <functional>
 #include <mutex>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Jobs for threads that take one after the other. Its lock is held for moments only, so a thread
 /// never waits long to take one. Thread-safe.

@@ -7,7 +7,7 @@
 #include <isobrick/error.h>
 #include "core/stopwatch.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// How often a thread that waits for another's brick checks whether it was cancelled.

@@ -15,7 +15,7 @@
 #include "stream/brick_set.h"
 #include "stream/brick_source.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Thrown to unwind cancelled work; never shown to users.
 class OperationCancelled final : public std::exception {};

@@ -7,7 +7,7 @@
 #include "core/morton.h"
 #include "core/stopwatch.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 constexpr Index kTileBlocks = kTileEdge / kBlockEdge;

@@ -10,7 +10,7 @@
 #include "core/tile.h"
 #include "stream/block_search.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// The tiles of a level that are active at an isovalue, or at any of several, in Morton order.
 /// They are found range chunk by range chunk: memory does not grow with the volume.

@@ -4,7 +4,7 @@
 
 #include "core/morton.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 constexpr int kLast = kTileSamples - 1;

@@ -8,7 +8,7 @@
 
 #include "surface/tile_state.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// The boundaries of finished tiles that tiles still to come will ask for.
 /// Tiles come in Morton order, so a tile's last asker is its neighbour at

@@ -21,7 +21,7 @@
 // triangulated without a diagonal between two edges of one face, because such a
 // diagonal would lie in the face, where the neighbour may put one as well.
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 inline constexpr int kMaxCaseTriangles = 5;
 

@@ -2,7 +2,7 @@
 
 #include "surface/case_rule.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// The tables that every extraction uses, for right- and for left-handed axes.
 extern const CaseTables kCaseTables;

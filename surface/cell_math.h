@@ -10,7 +10,7 @@
 // The arithmetic of a vertex, shared verbatim by both backends. Every operation
 // is one IEEE operation in the order written; the build forbids contraction.
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// The type in which samples of type T are interpolated: float holds every
 /// 8- and 16-bit integer, 32-bit integers need double.

@@ -2,7 +2,7 @@
 
 #include "core/stopwatch.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 ChunkWriter::ChunkWriter(MeshSink& sink) : sink_(sink) {
   free_.push(std::make_shared<Mesh>());

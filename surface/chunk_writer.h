@@ -11,7 +11,7 @@
 #include <isobrick/surface_options.h>
 #include <isobrick/surface_report.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Hands mesh chunks to a sink on a thread of its own, so that writing overlaps
 /// with making the next one. Either two buffers go round, or the extractor lends

@@ -14,7 +14,7 @@
 #include "surface/tile_vertices-inl.h"
 
 HWY_BEFORE_NAMESPACE();
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace HWY_NAMESPACE {
 
 /// Writes the tile's own vertices on coincident vertices. Their normals are those of the samples.

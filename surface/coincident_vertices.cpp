@@ -7,7 +7,7 @@
 #include "core/morton.h"
 #include "core/threshold.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 constexpr int kLast = kTileSamples - 1;

@@ -12,7 +12,7 @@
 // of all active edges around it coincide. Here they become one vertex, a *coincident vertex*, and
 // triangles with two corners in one vertex are left out. See docs/design/surface.md.
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// The sample of type T at which vertices coincide: it equals the isovalue in the
 /// type in which samples are interpolated. Nothing when no finite T does.

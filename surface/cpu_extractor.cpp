@@ -19,7 +19,7 @@
 #include "surface/tile_samples.h"
 #include "surface/world_map.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// Tiles that a thread takes between two hand-offs: enough for a hand-off to cost little, and

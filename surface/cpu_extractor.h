@@ -7,7 +7,7 @@
 
 #include "surface/surface_extractor.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// What bounds an extractor's memory. Never shows in the mesh.
 struct ExtractorLimits {

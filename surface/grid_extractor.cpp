@@ -6,7 +6,7 @@
 #include "surface/case_tables.h"
 #include "surface/grid_math.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 constexpr std::uint64_t below(int count) {

@@ -7,7 +7,7 @@
 #include <isobrick/surface_options.h>
 #include "surface/grid_view.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Marching cubes over one small grid, on the calling thread. The mesh is a function of the
 /// view alone, also in its order: gpu::GridBatch makes the same bytes.

@@ -5,7 +5,7 @@
 #include <isobrick/scalar.h>
 #include "surface/cell_math.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Most points of a grid along an axis.
 inline constexpr int kGridPoints = 65;

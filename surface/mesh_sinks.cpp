@@ -4,7 +4,7 @@
 
 #include "surface/surface_extractor.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 template <class T>

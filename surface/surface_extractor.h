@@ -7,7 +7,7 @@
 #include <isobrick/surface_report.h>
 #include "core/tile.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// How many layers of samples around its cells a tile needs: one for gradients
 /// and for looking at the neighbours of NaN and of samples that equal the

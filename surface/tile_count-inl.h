@@ -15,7 +15,7 @@
 #include "surface/tile_classify-inl.h"
 
 HWY_BEFORE_NAMESPACE();
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 

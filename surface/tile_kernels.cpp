@@ -17,7 +17,7 @@
 #include "surface/tile_vertices-inl.h"
 
 HWY_BEFORE_NAMESPACE();
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace HWY_NAMESPACE {
 
 void Count(ScalarType type, const KernelContext& context, TileState& tile) {
@@ -46,7 +46,7 @@ void Write(ScalarType type, const KernelContext& context, TileState& tile, Vec3f
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 void count_tile(ScalarType type, const KernelContext& context, TileState& tile) {
   static const auto best = ISOBRICK_BEST_OF(Count);

@@ -3,7 +3,7 @@
 #include <isobrick/surface_options.h>
 #include "surface/tile_state.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// What the kernels know of the surface, besides the tile.
 struct KernelContext {

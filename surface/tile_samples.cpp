@@ -4,7 +4,7 @@
 
 #include "core/copy_rows.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 template <class T>

@@ -5,7 +5,7 @@
 #include <isobrick/lattice.h>
 #include "core/tile.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Where the samples of a tile go: a place for its sample (0, 0, 0), and how far its rows
 /// and planes are apart, all counted in samples.

@@ -12,7 +12,7 @@
 #include "core/tile.h"
 #include "surface/cell_math.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Samples along a tile's edge: those of its cells' corners.
 inline constexpr int kTileSamples = static_cast<int>(kTileEdge) + 1;

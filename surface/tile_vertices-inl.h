@@ -16,7 +16,7 @@
 #include "surface/tile_kernels.h"
 
 HWY_BEFORE_NAMESPACE();
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 

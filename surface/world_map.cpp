@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 WorldMap world_map(const Transform& t, Inside inside) {
   WorldMap map;

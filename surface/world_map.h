@@ -4,7 +4,7 @@
 #include <isobrick/transform.h>
 #include "surface/cell_math.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// The transform as both backends apply it, in float. `inside` turns triangles and normals round.
 WorldMap world_map(const Transform& transform, Inside inside = Inside::above);

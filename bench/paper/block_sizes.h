@@ -2,7 +2,7 @@
 
 #include <vector>
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 struct LaunchShape;
 }
 

@@ -6,7 +6,7 @@
 
 #include "bricks/zarr/store_names.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// Of chunks that are kept, for bricks come in Morton order or in rows.

@@ -16,7 +16,7 @@
 // The checksums of a level's bricks as they are encoded: what a whole brick at the place of
 // another, or of another store, is recognised by.
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Where they lie in a store whose ranges lie below `additions`, a key.
 std::string brick_checksum_folder(const std::string& additions, int level);

@@ -5,7 +5,7 @@
 #include <string>
 #include <string_view>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// The text of an object with one more member, `crc32c`: the CRC-32C of the
 /// object without it, written with sorted keys and without blanks. Its numbers

@@ -8,7 +8,7 @@
 #include "bricks/storage/folder_storage.h"
 #include "bricks/zarr/codec.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// Larger files are not read at once: it is about what a disk reads in the time

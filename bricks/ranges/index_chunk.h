@@ -18,7 +18,7 @@
 // The file of an index chunk: parts, each encoded like a brick, and where they
 // are. What a part holds is not known here. docs/reference/store_format.md has the bytes.
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// A decoded part has no more bytes than this; longer ones are refused, so that
 /// broken files cannot take all the memory.

@@ -5,7 +5,7 @@
 #include "bricks/ranges/checksummed_json.h"
 #include "bricks/zarr/json_reader.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 constexpr int kVersion = 2;

@@ -6,7 +6,7 @@
 
 #include <isobrick/lattice.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// What is stored of one kind of index of one level, and how it is cut.
 ///

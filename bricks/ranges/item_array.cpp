@@ -10,7 +10,7 @@
 #include "bricks/zarr/codec.h"
 #include "bricks/zarr/json_reader.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 constexpr const char* kChecksums = "checksums";

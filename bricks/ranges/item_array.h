@@ -18,7 +18,7 @@
 #include "bricks/zarr/array_metadata.h"
 #include "bricks/zarr/publisher.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Writes an array of items, one for each brick or block of a level: ranges or checksums. Chunks
 /// are collected in memory and written as soon as all their items are known. Thread-safe.

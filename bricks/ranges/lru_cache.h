@@ -7,7 +7,7 @@
 #include <unordered_map>
 #include <utility>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Shared values by 64-bit key, the least recently used dropped when the
 /// weights exceed the budget. Thread-safe. A value in use outlives its eviction.

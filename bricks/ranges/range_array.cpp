@@ -8,7 +8,7 @@
 #include "bricks/ranges/range_format.h"
 #include "bricks/zarr/store_names.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 // Four gigabytes of ranges: a store that claims to have more must be read in parts.

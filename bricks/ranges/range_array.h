@@ -11,7 +11,7 @@
 #include "bricks/ranges/item_array.h"
 #include "bricks/ranges/lru_cache.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Where the ranges of bricks and of blocks lie in a store, below `additions`: all are keys.
 std::string brick_range_folder(const std::string& additions, int level);

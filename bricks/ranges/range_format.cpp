@@ -4,7 +4,7 @@
 
 #include "bricks/zarr/codec.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 constexpr int kRangeZstdLevel = 3;

@@ -14,7 +14,7 @@
 // items as a cube of kRangeChunkEdge has, C order [z, y, x], and the checksums of all chunks. No
 // files here.
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 inline constexpr Int3 kRangeChunkCube{kRangeChunkEdge, kRangeChunkEdge, kRangeChunkEdge};
 

@@ -12,7 +12,7 @@
 #include "bricks/zarr/json_reader.h"
 #include "bricks/zarr/store_names.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 constexpr int kZstdLevel = 3;

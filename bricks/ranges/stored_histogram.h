@@ -12,7 +12,7 @@
 // The histogram of level 0: how many samples each bin has, as an array below isobrick/0, and which
 // values the bins are of, in isobrick/ranges.json.
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 inline constexpr Index kMaxHistogramBins = Index{1} << 16;
 

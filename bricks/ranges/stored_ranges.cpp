@@ -4,7 +4,7 @@
 #include "bricks/storage/storage_keys.h"
 #include "bricks/zarr/json_reader.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 constexpr int kVersion = 3;

@@ -8,7 +8,7 @@
 
 #include "bricks/ranges/stored_histogram.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// The checksums of a level's arrays of ranges and of its bricks' checksums, as
 /// ItemArrayWriter::finish() gives them.

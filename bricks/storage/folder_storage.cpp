@@ -5,7 +5,7 @@
 #include "io/bytes/file.h"
 #include "io/bytes/folder_walk.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 namespace fs = std::filesystem;

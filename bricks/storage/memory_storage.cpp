@@ -4,7 +4,7 @@
 #include <isobrick/storage.h>
 #include "bricks/storage/storage_keys.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 using Objects = std::map<std::string, std::vector<std::byte>>;

@@ -7,7 +7,7 @@
 #include "io/bytes/file.h"
 #include "io/bytes/zip_signature.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 namespace fs = std::filesystem;
 

@@ -7,7 +7,7 @@
 
 #include <isobrick/error.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 void StoredObject::will_need(std::uint64_t /*offset*/, std::uint64_t /*size*/) const {}
 

@@ -10,7 +10,7 @@
 
 #include <isobrick/storage.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Whatever lies in a folder of Zarr, of any version, one of these is there.
 inline constexpr std::array<const char*, 4> kZarrFiles{"zarr.json", ".zattrs", ".zgroup",

@@ -14,7 +14,7 @@
 
 // The structures are those of PKWARE's APPNOTE.TXT, 4.3. All numbers are little endian.
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 using Bytes = std::span<const std::byte>;

@@ -6,7 +6,7 @@
 
 #include <isobrick/storage.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// An entry of a zip.
 struct ZipEntry {

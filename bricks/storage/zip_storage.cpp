@@ -11,7 +11,7 @@
 #include "bricks/storage/zip_directory.h"
 #include "core/printable.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// A part of another object.

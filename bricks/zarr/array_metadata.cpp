@@ -10,7 +10,7 @@
 #include "bricks/zarr/json_reader.h"
 #include "bricks/zarr/shard_index.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 using Json = nlohmann::ordered_json;

@@ -11,7 +11,7 @@
 #include "bricks/zarr/codec.h"
 #include "bricks/zarr/stored_type.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// The zarr.json of an array, as far as we read and write it. Lists are in
 /// Zarr's order: z, y, x.

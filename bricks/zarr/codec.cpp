@@ -17,7 +17,7 @@
 #include <isobrick/pod_buffer.h>
 #include "io/bytes/byte_order.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 static_assert(std::endian::native == std::endian::little, "samples are copied as they are");

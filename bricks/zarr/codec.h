@@ -11,7 +11,7 @@
 #include "bricks/zarr/decompress.h"
 #include "core/copy_box.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// How the samples of a chunk become bytes: little or big endian, then the
 /// steps in the order of encoding.

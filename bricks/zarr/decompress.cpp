@@ -17,7 +17,7 @@
 #include <isobrick/error.h>
 #include "io/bytes/inflate.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 constexpr std::array<std::string_view, 6> kNames{"zstd", "crc32c", "gzip", "zlib", "lz4", "blosc"};

@@ -5,7 +5,7 @@
 #include <span>
 #include <string_view>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// A step of a Zarr codec chain that turns bytes into bytes. Our stores have the
 /// first two; the others are read from images of other programs.

@@ -11,7 +11,7 @@
 #include "bricks/zarr/json_reader.h"
 #include "bricks/zarr/ome_transformations.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 using Json = nlohmann::ordered_json;

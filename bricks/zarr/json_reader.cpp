@@ -4,7 +4,7 @@
 
 #include <isobrick/error.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 // The parser itself does not recurse, but what it builds is walked recursively

@@ -6,7 +6,7 @@
 
 #include <isobrick/vec.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Metadata of others and of broken disks: every access reports where and what is
 /// wrong instead of trusting that a member is there and of the right type.

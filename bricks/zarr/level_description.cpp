@@ -9,7 +9,7 @@
 #include "bricks/zarr/shard_grid.h"
 #include "bricks/zarr/shard_index.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 constexpr Index kMaxShards = Index{1} << 56;  // so that a shard and its level make one key

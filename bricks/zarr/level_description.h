@@ -7,7 +7,7 @@
 #include "bricks/zarr/array_metadata.h"
 #include "bricks/zarr/volume_choice.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// All shard indices that a reader keeps may weigh so many bytes.
 inline constexpr std::uint64_t kIndexCacheBytes = std::uint64_t{64} << 20;

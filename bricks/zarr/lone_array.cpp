@@ -8,7 +8,7 @@
 #include <isobrick/error.h>
 #include "bricks/zarr/json_reader.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 using Json = nlohmann::ordered_json;

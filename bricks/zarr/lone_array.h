@@ -8,7 +8,7 @@
 // Zarr arrays that other programs have written: what their metadata leave to a reader to find out.
 // `where` names the file.
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// The zarr.json of a group whose multiscale image has this array as its only level, at ".".
 /// Throws Error for an array with less than three dimensions.

@@ -13,7 +13,7 @@
 #include "bricks/zarr/store_names.h"
 #include "bricks/zarr/zarr_v2.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 namespace fs = std::filesystem;

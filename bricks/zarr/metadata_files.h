@@ -9,7 +9,7 @@
 #include <isobrick/storage.h>
 #include "bricks/zarr/array_metadata.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// The content of the metadata files of an image, of any version of Zarr. The image is a store of
 /// ours, an OME-Zarr 0.5 or 0.4 image, or one Zarr array. An array counts as an image of one level

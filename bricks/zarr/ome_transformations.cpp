@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 // Zarr's axes are z, y, x, after others; ours are x, y, z.

@@ -7,7 +7,7 @@
 #include <isobrick/transform.h>
 #include "bricks/zarr/json_reader.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// OME-Zarr's coordinate transformations of the axes of space: world = matrix · index + offset.
 /// Axes before z, y, x are left out; a transformation that mixes them with space is refused.

@@ -4,7 +4,7 @@
 
 #include "bricks/zarr/store_names.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 // Each waiting file holds a descriptor.

@@ -16,7 +16,7 @@
 #include "io/bytes/file.h"
 #include "io/bytes/output_folder.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Syncs finished files of a folder and gives them their final names, on threads of its own
 /// so that nobody waits for the disk; the queue is bounded all the same. Several

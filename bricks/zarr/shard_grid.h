@@ -6,7 +6,7 @@
 #include <isobrick/lattice.h>
 #include <isobrick/level_info.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// How a level's bricks are divided into shards.
 struct ShardGrid {

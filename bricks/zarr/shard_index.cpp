@@ -7,7 +7,7 @@
 #include <isobrick/error.h>
 #include "bricks/zarr/codec.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 namespace {
 

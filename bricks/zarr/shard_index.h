@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// The index of a shard as Zarr's sharding_indexed codec stores it: offset and
 /// length of each brick, C order [z, y, x], little endian; both 2⁶⁴−1 for an

@@ -5,7 +5,7 @@
 
 #include "bricks/storage/storage_keys.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// The layout of a conversion under way; gone when the store is finished and has its name.
 inline constexpr const char* kLayoutMarker = ".isobrick-layout.json";

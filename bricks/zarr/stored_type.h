@@ -7,7 +7,7 @@
 
 #include <isobrick/scalar.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Types of Zarr that are none of ours: samples of them are widened as they are read, without
 /// loss. u64 and i64 become f64, f16 becomes f32, and a bool the u8 0 or 1.

@@ -4,7 +4,7 @@
 
 #include <isobrick/error.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 using Role = ImageMetadata::Axis::Role;

@@ -8,7 +8,7 @@
 #include <isobrick/selection.h>
 #include "bricks/zarr/array_metadata.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Which volume of an image with channels and times is read.
 struct VolumeChoice {

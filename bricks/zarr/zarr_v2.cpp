@@ -6,7 +6,7 @@
 #include "bricks/zarr/json_reader.h"
 #include "bricks/zarr/stored_type.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 using Json = nlohmann::ordered_json;

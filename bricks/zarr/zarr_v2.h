@@ -6,7 +6,7 @@
 #include <isobrick/image_metadata.h>
 #include "bricks/zarr/array_metadata.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 // Zarr version 2, translated to version 3, so that one parser reads
 // both. `where` names the file; DamageError for what is no valid Zarr, Error

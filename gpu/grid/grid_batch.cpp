@@ -14,7 +14,7 @@
 #include "gpu/memory/pinned_buffer.h"
 #include "surface/case_tables.h"
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 namespace {
 
 using Clock = std::chrono::steady_clock;

@@ -8,7 +8,7 @@
 #include "gpu/memory/mesh_arrays.h"
 #include "surface/grid_view.h"
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 
 /// Device memory for a grid's mesh, and how much there is.
 struct GridMeshPlace {

@@ -6,7 +6,7 @@
 #include "gpu/memory/cuda_check.h"
 #include "surface/grid_math.h"
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 namespace {
 
 /// That make the values of a grid.

@@ -8,7 +8,7 @@
 #include "surface/case_rule.h"
 #include "surface/grid_view.h"
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 
 inline constexpr int kGridRows = kGridPoints * kGridPoints;
 

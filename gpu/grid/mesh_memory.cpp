@@ -13,7 +13,7 @@
 #include "gpu/memory/cuda_check.h"
 #include "gpu/memory/mesh_arrays.h"
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 namespace {
 
 constexpr std::uint32_t kMaxVertices = 1u << 22, kFewestVertices = 1u << 17;

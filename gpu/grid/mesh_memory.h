@@ -9,7 +9,7 @@
 #include "core/mesh_free_list.h"
 #include "gpu/grid/grid_batch.h"
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 
 /// A large block of device memory that other interfaces (OpenGL) can import: an array of
 /// positions, one of as many normals, one of twice as many triangles.

@@ -5,7 +5,7 @@
 
 #include <isobrick/error.h>
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 
 /// Hands out slices of one buffer from the front, in device memory or on the host. Owns nothing.
 class Arena {

@@ -1,7 +1,7 @@
 #include "gpu/memory/copy_kernel.h"
 #include "gpu/memory/cuda_check.h"
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 namespace {
 
 constexpr unsigned kThreads = 256, kBlocksOfChunk = 8;

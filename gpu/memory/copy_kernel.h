@@ -4,7 +4,7 @@
 
 #include <cstddef>
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 
 /// Pieces of memory of the same size to copy, from where the device can read to where it can
 /// write.

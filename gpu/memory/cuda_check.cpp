@@ -4,7 +4,7 @@
 
 #include <isobrick/device.h>
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 namespace {
 
 void fail(cudaError_t result, const char* what, const std::source_location& where) {

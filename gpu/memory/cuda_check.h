@@ -4,7 +4,7 @@
 
 #include <source_location>
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 
 /// Throws Error with the name of the CUDA error and where it was noticed, OutOfDeviceMemory when
 /// it is that.

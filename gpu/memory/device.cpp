@@ -6,7 +6,7 @@
 
 #include "gpu/memory/cuda_check.h"
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 
 int device_count() noexcept {
   int count = 0;

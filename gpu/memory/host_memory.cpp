@@ -2,7 +2,7 @@
 
 #include "gpu/memory/pinned_buffer.h"
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 
 std::shared_ptr<std::byte> host_memory(int device, std::size_t bytes) {
   make_current(device);

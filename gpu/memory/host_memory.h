@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <memory>
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 
 /// A PinnedBuffer of bytes, without a CUDA header. From any thread; throws Error where the host has
 /// no room.

@@ -7,7 +7,7 @@
 
 #include <isobrick/error.h>
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 
 MappedPages::MappedPages(std::size_t bytes) : bytes_(whole_pages(bytes)) {
   if (bytes == 0) return;

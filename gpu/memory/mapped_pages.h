@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <utility>
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 
 /// Memory of whole pages of its own, for the driver to lock: large pages where it is as large as
 /// one. Touch it before: while the driver locks pages, others wait for

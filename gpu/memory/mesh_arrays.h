@@ -5,7 +5,7 @@
 #include <isobrick/mesh.h>
 #include "gpu/memory/arena.h"
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 
 /// The arrays of a mesh, on the device or in pinned memory; owned by others.
 struct MeshArrays {

@@ -2,7 +2,7 @@
 
 #include <nvtx3/nvtx3.hpp>
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 
 struct NvtxDomain {
   static constexpr const char* name = "isobrick";

@@ -6,7 +6,7 @@
 #include "gpu/memory/cuda_check.h"
 #include "gpu/memory/mapped_pages.h"
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 
 /// Owns `size` elements of pinned host memory, zeroed at first: copies from and to it run beside
 /// everything else, and kernels read and write it. Its pages are large where possible, which the

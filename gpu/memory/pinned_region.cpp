@@ -8,7 +8,7 @@
 #include "gpu/memory/cuda_check.h"
 #include "gpu/memory/nvtx_range.h"
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 namespace {
 
 /// Touches a large page at a time on any core of the arena.

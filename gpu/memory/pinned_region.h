@@ -9,7 +9,7 @@
 
 #include "gpu/memory/mapped_pages.h"
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 
 /// Page-locked host memory in chunks, which a thread of its own makes ready one after the other
 /// while others begin to work: as many cores as its maker has to itself touch a chunk, then the

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 
 UploadTracker::UploadTracker(int threads, std::size_t buffers_of_thread)
     : orders_(static_cast<std::size_t>(threads), Order(buffers_of_thread)),

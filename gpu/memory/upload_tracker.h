@@ -7,7 +7,7 @@
 #include <optional>
 #include <vector>
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 
 /// Tracks the buffers that threads fill with bricks, each its own, and the requests, numbered from
 /// 1, that copy them to their places. Thread-safe; uses no device.

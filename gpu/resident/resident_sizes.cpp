@@ -9,7 +9,7 @@
 #include "gpu/tile/tile_params.h"
 #include "surface/surface_extractor.h"
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 namespace {
 
 /// Mesh to expect of a tile before anything is known: some more than a sheet across it.

@@ -4,7 +4,7 @@
 
 #include <isobrick/device_volume.h>
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 
 /// Device memory that a resident volume and an extractor of it take.
 struct ResidentSizes {

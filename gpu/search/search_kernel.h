@@ -5,7 +5,7 @@
 #include <isobrick/scalar.h>
 #include "gpu/search/search_params.h"
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 
 /// Finds the tiles that the isovalue stabs, in their order, numbered from 0.
 void launch_search(ScalarType type, const SearchParams& params, cudaStream_t stream);

@@ -6,7 +6,7 @@
 
 // What the host hands to the search for active tiles. Plain data, no CUDA header.
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 
 /// All tiles of a volume in Morton order, and what the search for active ones leaves.
 struct SearchParams {

@@ -8,7 +8,7 @@
 // The kernel that finds active tiles, and those that make what it and the extraction read of a
 // volume: ranges and first columns.
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 
 inline constexpr int kSearchThreads = 256, kSearchWarps = kSearchThreads / 32;
 inline constexpr int kTilesOfSearchThread = static_cast<int>(kTilesOfSearchBlock) / kSearchThreads;

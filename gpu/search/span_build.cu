@@ -2,7 +2,7 @@
 
 #include "gpu/search/span_items.cuh"
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 namespace {
 
 void write_headers(const std::vector<IndexHeader>& headers, const BlockWriter& to,

@@ -6,7 +6,7 @@
 #include "gpu/memory/device_buffer.h"
 #include "index/index_format.h"
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 
 /// Indices of one kind and type in device memory, one after the other.
 struct IndexBlocks {

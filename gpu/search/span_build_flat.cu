@@ -3,7 +3,7 @@
 
 // The structures whose items keep their places: linear scan and octree.
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 namespace {
 
 template <class T>

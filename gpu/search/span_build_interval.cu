@@ -5,7 +5,7 @@
 // of the items whose min is not below the one before: a path through the items by
 // ascending min, all of whose places are found by doubling steps.
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 namespace {
 
 /// All item numbers by min, max and id, and by max and id; those by min also owner

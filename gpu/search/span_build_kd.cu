@@ -6,7 +6,7 @@
 // in the middle, the other one is separated by a stable move, for which one prefix
 // sum over all items counts.
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 namespace {
 
 /// An item's places in the orders by min and by max.

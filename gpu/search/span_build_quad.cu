@@ -5,7 +5,7 @@
 // level, each by one thread; bounds and sizes from the last level upwards, and with
 // them the place of each square before its descendants.
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 namespace {
 
 /// Bit i of the lower 32 bits becomes bit 2·i.

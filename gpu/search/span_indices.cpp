@@ -4,7 +4,7 @@
 
 #include <isobrick/error.h>
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 namespace {
 
 template <class T>

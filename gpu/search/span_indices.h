@@ -6,7 +6,7 @@
 #include "gpu/search/span_build.h"
 #include "gpu/search/span_kernels.h"
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 
 /// Indices in device memory, and for each of their items whether the isovalue of
 /// the last search stabs it. All work happens in the order of one stream.

@@ -17,7 +17,7 @@
 // What the builders on the device share. All of them make several indices at
 // once: their items lie index by index, and "owner" is the number of an index.
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 
 template <class F>
 __global__ void __launch_bounds__(256) each_of(std::uint32_t n, F f) {

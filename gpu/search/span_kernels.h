@@ -10,7 +10,7 @@
 // The launches of a search in indices that lie in device memory. Answers are bits
 // of a mask of 32-bit words: item i is bit i & 31 of word i >> 5.
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 
 /// Threads of a block that searches; a power of two.
 inline constexpr int kSearchThreads = 256;

@@ -10,7 +10,7 @@
 #include "gpu/search/span_indices.h"
 #include "index/instantiate.h"
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 namespace {
 
 /// Where the ranges of each grid begin, and what is to be built of them.

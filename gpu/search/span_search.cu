@@ -6,7 +6,7 @@
 #include "gpu/search/span_kernels.h"
 #include "gpu/search/span_walk.cuh"
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 namespace {
 
 constexpr int kWarps = kSearchThreads / 32;

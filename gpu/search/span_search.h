@@ -9,7 +9,7 @@
 #include <isobrick/vec.h>
 #include "index/index_format.h"
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 
 /// Span-space indices in device memory: the bytes of index/, searched there and
 /// built there. One index, such as that of a volume's blocks, is searched by the

@@ -4,7 +4,7 @@
 #include <cub/device/device_scan.cuh>
 #include <utility>
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 namespace {
 
 /// Calls run(memory, bytes) twice: for the size of temporary memory, and with it.

@@ -7,7 +7,7 @@
 // Sorting and scanning in device memory, in the order of a stream. Temporary
 // memory comes from the stream's pool and goes back to it.
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 
 /// out[i] = in[0] + … + in[i − 1], modulo 2³².
 void exclusive_sum(const std::uint32_t* in, std::uint32_t* out, std::uint32_t n,

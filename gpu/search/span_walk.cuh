@@ -11,7 +11,7 @@
 // as many parts as there are warps, so that no warp waits for another one and
 // none has a list of what is still to be visited; docs/design/search.md has the picture.
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 
 /// The warps that search one index together, and which of them this is. All 32
 /// threads of a warp walk alike and share the items that they report.

@@ -15,7 +15,7 @@
 #include "gpu/memory/pinned_region.h"
 #include "gpu/memory/upload_tracker.h"
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 namespace {
 
 /// Copies that one request makes: the driver admits one thread at a time, and the bus is idle

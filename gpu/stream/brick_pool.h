@@ -6,7 +6,7 @@
 #include <memory>
 #include <vector>
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 
 class Stream;
 

@@ -4,7 +4,7 @@
 
 #include "core/flat_map.h"
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 namespace {
 
 /// What of a brick the tiles of a launch need.

@@ -8,7 +8,7 @@
 #include "core/tile.h"
 #include "gpu/stream/stream_layout.h"
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 
 /// A brick that a launch takes along as a whole.
 struct UploadedBrick {

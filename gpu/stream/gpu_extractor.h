@@ -6,7 +6,7 @@
 #include "gpu/stream/stream_sizes.h"
 #include "surface/surface_extractor.h"
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 
 class BrickPool;
 

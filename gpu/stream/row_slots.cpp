@@ -6,7 +6,7 @@
 #include <isobrick/error.h>
 #include "core/morton.h"
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 namespace {
 
 /// Tiles of 8³ share their expiries: their codes differ in the last bits only.

@@ -10,7 +10,7 @@
 #include "core/flat_map.h"
 #include "gpu/tile/tile_params.h"
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 
 /// Which row table on the device belongs to which tile, as the BoundaryMap of the CPU:
 /// tiles come in Morton order, and a tile's last user is its neighbour at (+1, +1, +1).

@@ -8,7 +8,7 @@
 #include "gpu/memory/nvtx_range.h"
 #include "surface/surface_extractor.h"
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 namespace {
 
 /// Part of a launch's capacity that its mesh is meant to fill.

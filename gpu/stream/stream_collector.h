@@ -13,7 +13,7 @@
 #include "gpu/stream/stream_device.h"
 #include "surface/chunk_writer.h"
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 
 /// Follows the launches of a streaming extraction on a thread of its own. Waits for their kernels
 /// and repeats in parts what did not fit its output. Downloads the meshes and hands them to the

@@ -14,7 +14,7 @@
 #include "gpu/stream/stream_sizes.h"
 #include "gpu/tile/tile_kernel.h"
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 
 /// The buffers of a launch in flight: what the host sends, and where its mesh goes on the device.
 struct InFlightLaunch {

@@ -9,7 +9,7 @@
 // What the host sends for a launch, in one copy: the header, the items, their links,
 // their zeroed running totals, where the bricks of each lie. Bricks that are sent follow.
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 
 /// The words of a launch that it counts with.
 struct LaunchHeader {

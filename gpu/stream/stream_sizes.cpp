@@ -12,7 +12,7 @@
 #include "gpu/tile/block_groups.h"
 #include "surface/surface_extractor.h"
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 namespace {
 
 /// Mesh to expect of a tile before anything is known; launches shrink where there is more.

@@ -8,7 +8,7 @@
 #include <isobrick/lattice.h>
 #include <isobrick/surface_options.h>
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 
 /// A pool of bricks on the device (brick_pool.h), filled by so many threads.
 struct PoolSizes {

@@ -5,7 +5,7 @@
 #include <isobrick/scalar.h>
 #include "gpu/stream/unpack_params.h"
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 
 /// Lays the samples of streamed tiles out as tile blocks. Those that no active block
 /// needs are replaced by the sample that all blocks of a tile share, which changes no result.

@@ -6,7 +6,7 @@
 
 // What the host hands to the kernel that unpacks tiles. Plain data, no CUDA header.
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 
 /// The tiles of a launch, where their bricks lie, and where the extraction wants the samples.
 struct UnpackParams {

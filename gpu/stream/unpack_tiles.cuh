@@ -5,7 +5,7 @@
 
 // The kernel that lays the samples of streamed tiles out as tile blocks.
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 
 inline constexpr int kUnpackThreads = 512, kUnpackWarps = kUnpackThreads / 32;
 /// Layers below a tile's own samples that there is room for.

@@ -4,7 +4,7 @@
 
 #include "gpu/tile/tile_params.h"
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 
 /// Streamed tiles whose tile blocks lie together, and samples of such a group: their own
 /// tile blocks, and what they share for the samples around them (streamed_blocks.cuh).

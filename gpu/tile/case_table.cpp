@@ -1,7 +1,7 @@
 #include "gpu/tile/tile_params.h"
 #include "surface/case_tables.h"
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 
 CaseTable make_case_table(bool mirrored) {
   const CaseTables& tables = mirrored ? kMirroredCaseTables : kCaseTables;

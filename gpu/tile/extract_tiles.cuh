@@ -8,7 +8,7 @@
 // The extraction kernel: each thread block makes the meshes of one tile after the other. Its steps
 // are those of the CPU (docs/design/surface.md).
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 
 template <std::uint32_t Listed, bool Nan = false>
 constexpr std::size_t kSharedBytes = sizeof(TileShared) +

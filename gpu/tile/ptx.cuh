@@ -5,7 +5,7 @@
 // Instructions that CUDA C++ has no name for, or that its compiler would not choose (PTX ISA), and
 // nothing else: tests that run the kernels on a CPU have a header of the same name.
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 
 /// The thread's number, read anew at each call, so that values derived from it need no registers
 /// throughout a tile.

@@ -10,7 +10,7 @@
 // block (of the edges and corners, four by four).
 // docs/design/gpu.md has the picture.
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 
 /// Number of a tile's own block among the 27, x + 3·y + 9·z.
 inline constexpr int kOwnBlock = 13;

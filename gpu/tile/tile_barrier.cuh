@@ -6,7 +6,7 @@
 // shared memory (PTX ISA, mbarrier), at which who arrives goes on at once and who waits need not
 // arrive.
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 
 #if __CUDA_ARCH__ >= 800
 /// Whether the device has such barriers. Without them tiles take turns, with __syncthreads.

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cstring>
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 namespace {
 
 constexpr Int3 kPage{kTileEdge, kTileEdge, kTileEdge};

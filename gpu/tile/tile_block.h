@@ -4,7 +4,7 @@
 
 #include <isobrick/lattice.h>
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 
 /// Samples of a tile as the device keeps them: 32³, C order [z, y, x]. What
 /// lies outside of the volume is left as it is. False when all bricks are absent.

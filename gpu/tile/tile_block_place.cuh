@@ -2,7 +2,7 @@
 
 #include "gpu/tile/tile_params.h"
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 
 /// The block of the tile that lies at `place` in C order [z, y, x] of a resident volume.
 __device__ inline std::uint32_t block_of_place(const TileParams& p, std::int64_t place) {

@@ -6,7 +6,7 @@
 // The numbers of vertices that tiles share: what a tile leaves for later ones, and what it takes of
 // those before it.
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 
 /// Gives the tile's row table to later tiles, once it is known where its vertices go. One
 /// thread.

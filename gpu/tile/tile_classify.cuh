@@ -6,7 +6,7 @@
 
 // The inside bits of a tile's 33 × 33 rows, from global memory.
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 
 /// Which samples are inside. Narrow integers are compared within a word, 4 or 2 at
 /// once: the upper bit of (x without it) + c is set where the

@@ -6,7 +6,7 @@
 // sums within planes and over planes. Where the vertices and cells of a row begin is marked, so
 // that 32 threads that take 32 of them find their rows with a vote.
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 
 /// The active edges that start in a row, as words of EdgeRow, and those at sample
 /// 0, where only the first tiles look. Not all belong to the tile.

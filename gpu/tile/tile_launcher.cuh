@@ -5,7 +5,7 @@
 #include "gpu/tile/extract_tiles.cuh"
 #include "gpu/tile/tile_kernel.h"
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 
 inline int device_attribute(cudaDeviceAttr attribute) {
   int device = 0, value = 0;

@@ -5,7 +5,7 @@
 // How warps take what is listed of a tile: 32 things at a time, whose rows 32 threads find by a
 // vote over the marks that counting has left (tile_count.cuh).
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 
 /// The row of a lane's thing, and its place among the row's.
 struct PlaceInRow {

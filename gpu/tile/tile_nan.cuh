@@ -6,7 +6,7 @@
 // Volumes that may hold NaN: cells with such a corner are left out, and edges with no
 // other cell around them.
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 
 /// Which samples around a tile are not numbers or outside of the region of interest. Lies
 /// where the lists will be, until the rows are counted.

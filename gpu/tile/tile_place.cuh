@@ -6,7 +6,7 @@
 
 // Where the tile's vertices and triangles go in the mesh.
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 
 inline constexpr unsigned long long kOwnSum = 1ull << 62, kFullSum = 2ull << 62,
                                     kSumMask = kOrderMask;

@@ -6,7 +6,7 @@
 // a group, so that a thread has the same y in all of them; the last rows of all planes are
 // two more.
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 
 /// The first 32 rows of a plane.
 struct PlaneRows {

@@ -8,7 +8,7 @@
 
 // How a block of threads works on one tile; docs/design/gpu.md has the whole picture.
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 
 inline constexpr unsigned kFullMask = 0xffffffffu;
 /// What lies between the words of a row along x, y and z. The cells of a warp lie in rows

@@ -9,7 +9,7 @@
 
 // The steps from the samples of a tile to its mesh, and where its warps wait for each other.
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 
 /// A tile without a vertex or a cell publishes zero sums and no row table: later tiles add nothing
 /// and find no vertex there.

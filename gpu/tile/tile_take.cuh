@@ -6,7 +6,7 @@
 
 // Before the first step: which tile is the next, and where its samples lie.
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 
 /// Pages of the tiles around one, and the first columns of those one higher along x; where
 /// there is none, any that is. The first warp.

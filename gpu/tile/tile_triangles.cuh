@@ -4,7 +4,7 @@
 
 // The triangles of a tile, written where they belong.
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 
 /// How far behind a row's word its number lies, in bytes.
 inline constexpr std::uint32_t kNumberOfWord =

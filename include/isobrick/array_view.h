@@ -7,10 +7,11 @@
 #include <string>
 #include <vector>
 
+#include <isobrick/api.h>
 #include <isobrick/selection.h>
 #include <isobrick/vec.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// What an axis of an array in a file stands for.
 enum class AxisRole : std::uint8_t { space, channel, time };
@@ -39,13 +40,13 @@ struct ArrayView {
 /// Exactly three are space. Throws UsageError, beginning with `path`, for sizes
 /// that are not positive or overflow and for two axes of one direction. It throws one too where
 /// a channel or a time must be chosen, and where the chosen one does not exist.
-ArrayView select_volume(const std::string& path, std::span<const ArrayAxis> axes,
-                        const Selection& selection);
+ISOBRICK_API ArrayView select_volume(const std::string& path, std::span<const ArrayAxis> axes,
+                                     const Selection& selection);
 
 /// Where a file leaves open which three of its axes (fastest first) are space:
 /// those of size 1 are not, nor is the first when a channel is selected, nor the
 /// last when a time is. False when that leaves other than three.
-bool guess_roles(std::vector<ArrayAxis>& axes, const Selection& selection);
+ISOBRICK_API bool guess_roles(std::vector<ArrayAxis>& axes, const Selection& selection);
 
 /// What to do about guess_roles being false, for a message.
 inline constexpr const char* kRolesHint =

@@ -6,13 +6,14 @@
 #include <stop_token>
 #include <vector>
 
+#include <isobrick/api.h>
 #include <isobrick/downsampling.h>
 #include <isobrick/image_metadata.h>
 #include <isobrick/index_build.h>
 #include <isobrick/progress.h>
 #include <isobrick/volume_source.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// How a store is written.
 struct ConvertOptions {
@@ -57,7 +58,8 @@ struct ConvertReport {
 /// at the end. Reads each input sample once. Throws UsageError when the budget
 /// is too small for one row of bricks (naming the least that does), and where
 /// ConvertStaging does.
-ConvertReport convert(VolumeSource& source, const std::filesystem::path& out,
-                      const ConvertOptions& options, Progress& progress = no_progress());
+ISOBRICK_API ConvertReport convert(VolumeSource& source, const std::filesystem::path& out,
+                                   const ConvertOptions& options,
+                                   Progress& progress = no_progress());
 
 }  // namespace isobrick

@@ -4,7 +4,7 @@
 #include <optional>
 #include <string_view>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// What a sample of a coarser level is of the samples that it stands for. `mode` is the most
 /// frequent value, as label images need; `stride` is the first sample.

@@ -4,9 +4,10 @@
 #include <span>
 #include <vector>
 
+#include <isobrick/api.h>
 #include <isobrick/extract.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// What of a level the isovalue touches, from the ranges alone.
 struct ActiveParts {
@@ -18,13 +19,14 @@ struct ActiveParts {
 };
 
 /// Counts the active parts of one level. Throws as extract() does for options that make no sense.
-ActiveParts count_active(const StoreReader& store, const ExtractOptions& options);
+ISOBRICK_API ActiveParts count_active(const StoreReader& store, const ExtractOptions& options);
 /// The same of each of several isovalues, instead of that of the options. Reads the ranges once.
-std::vector<ActiveParts> count_active(const StoreReader& store, const ExtractOptions& options,
-                                      std::span<const double> isovalues);
+ISOBRICK_API std::vector<ActiveParts> count_active(const StoreReader& store,
+                                                   const ExtractOptions& options,
+                                                   std::span<const double> isovalues);
 
 /// What no mesh in these parts exceeds; real ones are mostly some ten times smaller.
-MeshSize largest_mesh(const ActiveParts& active);
+ISOBRICK_API MeshSize largest_mesh(const ActiveParts& active);
 
 /// What an extraction will need.
 struct ExtractEstimate {
@@ -39,7 +41,7 @@ struct ExtractEstimate {
 /// bricks, or those of 4 cubes where that is more, within the memory budget;
 /// deterministic, also over thread counts. `sink_bytes` is the MeshSink::memory() of the sink
 /// that the mesh will go to. Throws as extract() does.
-ExtractEstimate estimate(const StoreReader& store, const ExtractOptions& options,
-                         std::uint64_t sink_bytes);
+ISOBRICK_API ExtractEstimate estimate(const StoreReader& store, const ExtractOptions& options,
+                                      std::uint64_t sink_bytes);
 
 }  // namespace isobrick

@@ -5,11 +5,12 @@
 #include <optional>
 #include <stop_token>
 
+#include <isobrick/api.h>
 #include <isobrick/inside.h>
 #include <isobrick/progress.h>
 #include <isobrick/store_reader.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// The files that samples can become. A raw file has a NRRD header beside it, OUT.nhdr.
 enum class ExportFormat : std::uint8_t { raw, nrrd, vdb };
@@ -42,7 +43,7 @@ struct ExportOptions {
 /// grid, which must be whole before it can be written: its samples that are not
 /// the fill value, or a UsageError once they exceed the budget. Nothing appears under
 /// the final name until it is whole.
-void export_volume(const StoreReader& store, const std::filesystem::path& out,
-                   const ExportOptions& options, Progress& progress = no_progress());
+ISOBRICK_API void export_volume(const StoreReader& store, const std::filesystem::path& out,
+                                const ExportOptions& options, Progress& progress = no_progress());
 
 }  // namespace isobrick

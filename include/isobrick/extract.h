@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include <isobrick/api.h>
 #include <isobrick/index_choice.h>
 #include <isobrick/inside.h>
 #include <isobrick/mesh.h>
@@ -16,7 +17,7 @@
 #include <isobrick/store_reader.h>
 #include <isobrick/surface_report.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// What makes the surface. The mesh is the same.
 enum class Backend : std::uint8_t {
@@ -82,25 +83,27 @@ struct ExtractReport : SurfaceReport {
 };
 
 /// The stages that there were, by name.
-std::vector<std::pair<std::string_view, StageReport>> stages_of(const ExtractReport& report);
+ISOBRICK_API std::vector<std::pair<std::string_view, StageReport>> stages_of(
+    const ExtractReport& report);
 
 /// The stage that was busy longest.
-std::string_view bound_of(const ExtractReport& report);
+ISOBRICK_API std::string_view bound_of(const ExtractReport& report);
 
 /// The least `memory` that extract() takes without a GPU, for a sink of this indexing that holds
 /// `sink_bytes` (MeshSink::memory()). Throws as it does for options that make no sense.
-std::uint64_t min_extract_memory(const StoreReader& store, const ExtractOptions& options,
-                                 Indexing indexing, std::uint64_t sink_bytes);
+ISOBRICK_API std::uint64_t min_extract_memory(const StoreReader& store,
+                                              const ExtractOptions& options, Indexing indexing,
+                                              std::uint64_t sink_bytes);
 
 /// Streams the isosurface of one level into `sink` (begin … finish).
 /// Throws UsageError for a level, ROI or isovalue that makes no sense, a budget too small
 /// for one tile with its neighbours, or a surface that Backend::cuda cannot make; Error where
 /// there is no CUDA device for it. Backend::automatic takes the CPU where the GPU cannot.
-ExtractReport extract(const StoreReader& store, const ExtractOptions& options, MeshSink& sink,
-                      Progress& progress = no_progress());
+ISOBRICK_API ExtractReport extract(const StoreReader& store, const ExtractOptions& options,
+                                   MeshSink& sink, Progress& progress = no_progress());
 /// The same into memory: a welded mesh, which the budget does not count.
-Mesh extract(const StoreReader& store, const ExtractOptions& options,
-             Progress& progress = no_progress());
+ISOBRICK_API Mesh extract(const StoreReader& store, const ExtractOptions& options,
+                          Progress& progress = no_progress());
 
 /// Streams several surfaces of one level, each into its sink, and reads and decodes every brick
 /// once for all of them. Bricks that any isovalue touches are visited once, in the order of a
@@ -119,8 +122,9 @@ Mesh extract(const StoreReader& store, const ExtractOptions& options,
 ///
 /// Throws as above: for options that make no sense, and for a `memory` too small for one of the
 /// surfaces on the CPU, before any sink begins. A report for each surface.
-std::vector<ExtractReport> extract(const StoreReader& store, const ExtractOptions& options,
-                                   std::span<const SurfaceOutput> outputs,
-                                   Progress& progress = no_progress());
+ISOBRICK_API std::vector<ExtractReport> extract(const StoreReader& store,
+                                                const ExtractOptions& options,
+                                                std::span<const SurfaceOutput> outputs,
+                                                Progress& progress = no_progress());
 
 }  // namespace isobrick

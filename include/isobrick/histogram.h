@@ -5,11 +5,12 @@
 #include <string>
 #include <vector>
 
+#include <isobrick/api.h>
 #include <isobrick/progress.h>
 #include <isobrick/range.h>
 #include <isobrick/store_reader.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// How the samples of one level spread over their values. Bin i has the samples from
 /// first + i * bin_width to below first + (i + 1) * bin_width.
@@ -33,40 +34,40 @@ inline constexpr Index kMaxLookups = Index{1} << 20;
 /// The histogram of level 0 that a store keeps; nullopt if it keeps none. It has at most 65,536
 /// bins, of integers of 8 and 16 bits one for each value. Reads no samples. Throws DamageError
 /// where it is damaged.
-std::optional<Histogram> stored_histogram(const StoreReader& store);
+ISOBRICK_API std::optional<Histogram> stored_histogram(const StoreReader& store);
 
 /// Why the histogram of a store that keeps none takes more than `memory` bytes, or too many
 /// look-ups of files; empty when it does not.
-std::string why_no_histogram(const StoreReader& store, std::uint64_t memory);
+ISOBRICK_API std::string why_no_histogram(const StoreReader& store, std::uint64_t memory);
 
 /// A histogram in at most so many bins: the stored one or, where there is none, that of the finest
 /// level with at most 2²⁴ samples (or else of the coarsest), read brick by brick. Throws
 /// DamageError for a damaged one, and Error for a brick that cannot be read, unless those are to be
 /// left out and others are left.
-Histogram histogram(const StoreReader& store, Progress& progress = no_progress(), int max_bins = 64,
-                    bool leaves_out = false);
+ISOBRICK_API Histogram histogram(const StoreReader& store, Progress& progress = no_progress(),
+                                 int max_bins = 64, bool leaves_out = false);
 
 /// The same samples in at most so many bins of equal width, the first of which begins at lo: for
 /// drawings. The samples of a bin stay together, so those near bounds may be in the bin beside.
-Histogram rebin(const Histogram& histogram, int max_bins);
+ISOBRICK_API Histogram rebin(const Histogram& histogram, int max_bins);
 
 /// The threshold that splits the samples into two classes with the largest variance between them
 /// (N. Otsu, A threshold selection method from gray-level histograms, IEEE Trans. Syst. Man Cybern.
 /// 9, 1979): the centre of the last bin of the lower class, which is that of scikit-image's
 /// threshold_otsu for the same bins. Of integers in bins of width 1 it is the value itself. nullopt
 /// where fewer than two bins have samples.
-std::optional<double> otsu(const Histogram& histogram);
+ISOBRICK_API std::optional<double> otsu(const Histogram& histogram);
 
 /// The value that `percent` percent of the finite samples do not exceed. Of integers in bins of
 /// width 1 it is a sample, numpy.percentile's of method "inverted_cdf"; otherwise samples count as
 /// spread evenly over their bin. nullopt where no sample is finite, or for less than 0 percent or
 /// more than 100.
-std::optional<double> percentile(const Histogram& histogram, double percent);
+ISOBRICK_API std::optional<double> percentile(const Histogram& histogram, double percent);
 
 /// The smallest or the largest sample if it lies so far from all others that these share a few
 /// bins, as values that stand for missing samples do (-9999, -1e30). otsu() and percentile() are
 /// no better than these bins are wide. nullopt where there is none, and of integers in bins of
 /// width 1, which are exact.
-std::optional<double> far_value(const Histogram& histogram);
+ISOBRICK_API std::optional<double> far_value(const Histogram& histogram);
 
 }  // namespace isobrick

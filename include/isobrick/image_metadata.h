@@ -8,9 +8,10 @@
 #include <string_view>
 #include <vector>
 
+#include <isobrick/api.h>
 #include <isobrick/transform.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// What a store is written as: OME-Zarr 0.5 is Zarr version 3, 0.4 is version 2 and has no
 /// shards, so that each brick is a file.
@@ -63,18 +64,19 @@ struct ImageMetadata {
 inline constexpr int kStoreVersion = 3;
 
 /// The zarr.json of the root group.
-std::string to_json(const ImageMetadata& image);
+ISOBRICK_API std::string to_json(const ImageMetadata& image);
 
 /// Reads the root's zarr.json; `where` names the file. DamageError for what is
 /// broken, Error for an unknown version or what is not supported.
-ImageMetadata parse_image_metadata(std::string_view text, const std::string& where);
+ISOBRICK_API ImageMetadata parse_image_metadata(std::string_view text, const std::string& where);
 
 /// CRC-32C over the values that the root's zarr.json and those of its levels
 /// hold, in the order of the levels; docs/reference/store_format.md defines over which and
 /// how. The root's own checksum does not enter it, nor does how the JSON is laid
 /// out. Images of others, without `attributes.isobrick`, have one, too.
 /// `where` names the root's file.
-std::uint32_t metadata_checksum(std::string_view root, std::span<const std::string> levels,
-                                const std::string& where);
+ISOBRICK_API std::uint32_t metadata_checksum(std::string_view root,
+                                             std::span<const std::string> levels,
+                                             const std::string& where);
 
 }  // namespace isobrick

@@ -5,12 +5,13 @@
 #include <stop_token>
 #include <vector>
 
+#include <isobrick/api.h>
 #include <isobrick/index_kind.h>
 #include <isobrick/lattice.h>
 #include <isobrick/progress.h>
 #include <isobrick/selection.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Cells along each edge of an item by default: the blocks by
 /// which an extraction skips, whose ranges every store has. docs/design/search.md.
@@ -41,13 +42,13 @@ struct IndexReport {
 
 /// The least budget of such an index of `lattice`. Throws UsageError for a kind or leaf that stores
 /// cannot have.
-std::uint64_t min_index_memory(const IndexOptions& options, const Lattice& lattice);
+ISOBRICK_API std::uint64_t min_index_memory(const IndexOptions& options, const Lattice& lattice);
 
 /// Throws UsageError for a kind or leaf that stores cannot have, and for a budget
 /// that is too small for such an index of `lattice`, naming the least that does: that of the
 /// command, of which `others` bytes are in use already.
-void check_index_options(const IndexOptions& options, const Lattice& lattice,
-                         std::uint64_t others = 0);
+ISOBRICK_API void check_index_options(const IndexOptions& options, const Lattice& lattice,
+                                      std::uint64_t others = 0);
 
 /// Adds an index of all levels to a store, that of another program too: ranges
 /// that it lacks are computed first, and with `force` those of an image of others
@@ -55,7 +56,7 @@ void check_index_options(const IndexOptions& options, const Lattice& lattice,
 /// is whole; until then the store is as it was. Throws UsageError when there is
 /// one and neither `resume` nor `force` is set, or when the budget is too
 /// small (naming the least that does), Error when another process is at it.
-IndexReport add_index(const std::filesystem::path& store, const IndexOptions& options,
-                      Progress& progress = no_progress());
+ISOBRICK_API IndexReport add_index(const std::filesystem::path& store, const IndexOptions& options,
+                                   Progress& progress = no_progress());
 
 }  // namespace isobrick

@@ -4,7 +4,7 @@
 
 #include <isobrick/index_kind.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// How an extraction finds the active blocks. The mesh is the same.
 struct IndexChoice {

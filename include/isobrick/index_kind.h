@@ -4,7 +4,7 @@
 #include <optional>
 #include <string_view>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// The structures that answer which ranges an isovalue stabs.
 enum class IndexKind : std::uint8_t { linear, interval, kdtree, quadtree, octree };

@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Which samples are inside of a surface. Triangles and vertices lie in the same places, and
 /// samples that equal the isovalue stay on the side of the larger ones.

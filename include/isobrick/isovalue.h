@@ -6,11 +6,12 @@
 #include <string_view>
 #include <vector>
 
+#include <isobrick/api.h>
 #include <isobrick/histogram.h>
 #include <isobrick/scalar.h>
 #include <isobrick/store_reader.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// An isovalue as people state it: a number, or one that the samples give.
 struct IsovalueRequest {
@@ -33,19 +34,19 @@ inline constexpr std::size_t kMaxIsovalues = 1000;
 /// Reads "300", "otsu", "p99.5" (a percentile), "50%" (of the range), "300HU", a preset such as
 /// "ct-bone", "100:500:50" (from, to, step), or several of them with commas between. Throws
 /// UsageError.
-std::vector<IsovalueRequest> parse_isovalues(std::string_view text);
+ISOBRICK_API std::vector<IsovalueRequest> parse_isovalues(std::string_view text);
 
 /// The presets that parse_isovalues() knows, with their values: "ct-skin (-300 HU), …".
-std::string isovalue_presets();
+ISOBRICK_API std::string isovalue_presets();
 
 /// Whether the isovalue depends on the samples.
-bool needs_histogram(const IsovalueRequest& request);
+ISOBRICK_API bool needs_histogram(const IsovalueRequest& request);
 
 /// The isovalue. For Otsu's threshold that is the upper bound of the bin that otsu() names, so that
 /// no sample of whole numbers equals it. Throws UsageError where no sample is finite, where all are
 /// equal and Otsu's is requested, and for Hounsfield units of samples without a sign.
-double resolve_isovalue(const IsovalueRequest& request, const Histogram& histogram,
-                        ScalarType type);
+ISOBRICK_API double resolve_isovalue(const IsovalueRequest& request, const Histogram& histogram,
+                                     ScalarType type);
 
 /// An isovalue for a volume of which nothing else is known.
 struct SuggestedIsovalue {
@@ -55,7 +56,7 @@ struct SuggestedIsovalue {
 
 /// Suggests 0 for a level set, the border of the lowest label for labels, else Otsu's threshold.
 /// nullopt where all samples are equal or none is finite.
-std::optional<SuggestedIsovalue> suggest_isovalue(const StoreInfo& info,
-                                                  const Histogram& histogram);
+ISOBRICK_API std::optional<SuggestedIsovalue> suggest_isovalue(const StoreInfo& info,
+                                                               const Histogram& histogram);
 
 }  // namespace isobrick

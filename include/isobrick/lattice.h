@@ -4,10 +4,11 @@
 #include <limits>
 #include <optional>
 
+#include <isobrick/api.h>
 #include <isobrick/scalar.h>
 #include <isobrick/vec.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Edge, in cells, of the blocks whose ranges every store keeps (`block_range`).
 /// Blocks lie on the volume's lattice, whatever the brick size.
@@ -18,7 +19,7 @@ inline constexpr Index kBlockEdge = 16;
 inline constexpr Index kTileEdge = 32;
 
 /// The samples of one level and how they are cut into bricks.
-struct Lattice {
+struct ISOBRICK_API Lattice {
   Int3 extent;                       ///< samples along x, y, z
   Int3 brick{64, 64, 64};            ///< samples of a brick along x, y, z
   ScalarType type = ScalarType::u8;  ///< of the samples
@@ -59,7 +60,7 @@ constexpr std::optional<Index> checked_volume(Int3 e) {
 }
 
 /// Looks decoded bricks up. The owner documents how long pointers stay valid.
-class BrickLookup {
+class ISOBRICK_API BrickLookup {
  public:
   virtual ~BrickLookup() = default;
   /// The samples of brick `b`, C order [z, y, x] of the lattice's full brick

@@ -5,7 +5,7 @@
 #include <isobrick/lattice.h>
 #include <isobrick/transform.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// More samples along an axis are not supported: meshes number tiles of 32 cells
 /// with 21 bits an axis.

@@ -8,10 +8,11 @@
 #include <span>
 #include <string>
 
+#include <isobrick/api.h>
 #include <isobrick/pod_buffer.h>
 #include <isobrick/vec.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Three vertex numbers, counter-clockwise seen from outside (see Inside).
 using Triangle = std::array<std::uint32_t, 3>;
@@ -43,7 +44,7 @@ struct MeshFileOptions;
 
 /// A mesh in memory. Reused, it allocates nothing. With a memory resource, which must outlive it,
 /// all arrays lie in the caller's memory.
-struct Mesh {
+struct ISOBRICK_API Mesh {
   PodBuffer<Vec3f> positions;     ///< of the vertices, in world space
   PodBuffer<Vec3f> normals;       ///< unit length, outward; empty or one a position
   PodBuffer<Triangle> triangles;  ///< numbers of vertices
@@ -95,7 +96,7 @@ struct MeshHeader {
 };
 
 /// Takes a mesh chunk by chunk. Calls come from one thread at a time, in order.
-class MeshSink {
+class ISOBRICK_API MeshSink {
  public:
   virtual ~MeshSink() = default;
 

@@ -6,26 +6,27 @@
 #include <optional>
 #include <string_view>
 
+#include <isobrick/api.h>
 #include <isobrick/mesh.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// The files that a mesh can become.
 enum class MeshFormat : std::uint8_t { ply, stl, obj, glb, vtp, pvtp };
 
 /// The format's name for people: "PLY".
-std::string_view name_of(MeshFormat format);
+ISOBRICK_API std::string_view name_of(MeshFormat format);
 
 /// The usual extension of its files: ".ply".
-std::string_view extension_of(MeshFormat format);
+ISOBRICK_API std::string_view extension_of(MeshFormat format);
 
 /// The format of files with an extension such as ".ply" (or ".PLY"); nullopt for any other.
-std::optional<MeshFormat> find_mesh_format(std::string_view extension);
+ISOBRICK_API std::optional<MeshFormat> find_mesh_format(std::string_view extension);
 
 /// Whether a mesh of this format has normals at its vertices. An STL has them at facets only.
-bool has_normals(MeshFormat format);
+ISOBRICK_API bool has_normals(MeshFormat format);
 /// Whether its triangles share vertices, so that it has a number of them.
-bool has_vertices(MeshFormat format);
+ISOBRICK_API bool has_vertices(MeshFormat format);
 
 /// How a mesh file is written.
 struct MeshFileOptions {
@@ -42,10 +43,10 @@ struct MeshFileOptions {
 /// before leaves nothing. The name "-" is standard output, which is written to once the mesh is
 /// finished, of OBJ sooner; PVTP cannot go there. Throws UsageError when the file exists and
 /// `force` is not set or its name has no known extension, Error when it cannot be made.
-std::unique_ptr<MeshSink> create_mesh_file(const std::filesystem::path& path,
-                                           const MeshFileOptions& options);
+ISOBRICK_API std::unique_ptr<MeshSink> create_mesh_file(const std::filesystem::path& path,
+                                                        const MeshFileOptions& options);
 
 /// What MeshSink::memory() of such a mesh is.
-std::uint64_t mesh_file_memory(MeshFormat format, int threads, std::uint64_t memory);
+ISOBRICK_API std::uint64_t mesh_file_memory(MeshFormat format, int threads, std::uint64_t memory);
 
 }  // namespace isobrick

@@ -4,12 +4,13 @@
 #include <functional>
 #include <utility>
 
+#include <isobrick/api.h>
 #include <isobrick/mesh.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Takes a welded mesh into memory.
-class MemorySink final : public MeshSink {
+class ISOBRICK_API MemorySink final : public MeshSink {
  public:
   /// Replaces what `mesh` holds, in its memory where that is enough. `mesh` must outlive it.
   explicit MemorySink(Mesh& mesh) : mesh_(mesh) {}
@@ -26,7 +27,7 @@ class MemorySink final : public MeshSink {
 
 /// Calls a function with every chunk of a mesh. The calls come from one thread at a time, which
 /// need not be the caller's. What the function throws ends the operation.
-class FunctionSink final : public MeshSink {
+class ISOBRICK_API FunctionSink final : public MeshSink {
  public:
   /// The chunk is valid until the function returns.
   using Function = std::function<void(const MeshChunk&)>;

@@ -8,11 +8,12 @@
 #include <string>
 #include <vector>
 
+#include <isobrick/api.h>
 #include <isobrick/progress.h>
 #include <isobrick/store_reader.h>
 #include <isobrick/volume_request.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Where the stores of volumes that are no stores themselves are kept.
 struct CacheOptions {
@@ -25,7 +26,7 @@ struct CacheOptions {
 };
 
 /// $XDG_CACHE_HOME/isobrick, else ~/.cache/isobrick; empty where neither is known.
-std::filesystem::path default_cache_folder();
+ISOBRICK_API std::filesystem::path default_cache_folder();
 
 /// How a volume is opened.
 struct OpenOptions {
@@ -43,7 +44,7 @@ struct OpenOptions {
 };
 
 /// A volume that can be read as a store, whatever its format.
-class OpenedVolume {
+class ISOBRICK_API OpenedVolume {
  public:
   /// Opens a store in place where it has ranges and the request takes all of it as it is. Anything
   /// else is converted: what open_source() opens, another program's Zarr without ranges, a store of

@@ -6,7 +6,9 @@
 #include <type_traits>
 #include <utility>
 
-namespace isobrick {
+#include <isobrick/api.h>
+
+namespace isobrick::inline v0 {
 namespace detail {
 
 /// Bytes from which memory of the process lies in large pages: their rounding wastes little then.
@@ -15,10 +17,11 @@ inline constexpr std::size_t kLargeMemory = std::size_t{32} << 20;
 /// Memory of `capacity` bytes, which begins with the first `used` bytes of `data`. Frees `data`, of
 /// `old_capacity` bytes or null. Of `memory`, or of the process where that is null. Throws
 /// std::bad_alloc; `data` is as it was then.
-void* grow_memory(std::pmr::memory_resource* memory, void* data, std::size_t used,
-                  std::size_t old_capacity, std::size_t capacity);
+ISOBRICK_API void* grow_memory(std::pmr::memory_resource* memory, void* data, std::size_t used,
+                               std::size_t old_capacity, std::size_t capacity);
 /// Frees what grow_memory() gave; null is none.
-void free_memory(std::pmr::memory_resource* memory, void* data, std::size_t capacity) noexcept;
+ISOBRICK_API void free_memory(std::pmr::memory_resource* memory, void* data,
+                              std::size_t capacity) noexcept;
 
 }  // namespace detail
 

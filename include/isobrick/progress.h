@@ -3,10 +3,12 @@
 #include <cstdint>
 #include <string_view>
 
-namespace isobrick {
+#include <isobrick/api.h>
+
+namespace isobrick::inline v0 {
 
 /// Where long operations report to. Calls come from one thread at a time.
-class Progress {
+class ISOBRICK_API Progress {
  public:
   virtual ~Progress() = default;
   /// A stage of `total` bytes (or 0 when unknown) begins.
@@ -18,7 +20,7 @@ class Progress {
 };
 
 /// Swallows everything.
-class NoProgress final : public Progress {
+class ISOBRICK_API NoProgress final : public Progress {
  public:
   void begin(std::string_view, std::uint64_t) override {}
   void advance(std::uint64_t) override {}

@@ -2,7 +2,7 @@
 
 #include <limits>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Smallest and largest sample of a set, NaN left out. The range of no sample
 /// at all is inverted (lo > hi) and is stabbed by no isovalue.

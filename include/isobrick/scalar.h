@@ -9,7 +9,7 @@
 #include <type_traits>
 #include <utility>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// The eight sample types of a store.
 enum class ScalarType : std::uint8_t { u8, i8, u16, i16, u32, i32, f32, f64 };

@@ -11,10 +11,12 @@
 #include <string>
 #include <vector>
 
-namespace isobrick {
+#include <isobrick/api.h>
+
+namespace isobrick::inline v0 {
 
 /// An object of a storage, open to read. Thread-safe.
-class StoredObject {
+class ISOBRICK_API StoredObject {
  public:
   virtual ~StoredObject() = default;
 
@@ -33,7 +35,7 @@ class StoredObject {
 /// What a store is read from: objects by key, a relative name such as "0/c/0/0/1", whose parts "/"
 /// separates. No key has an empty part, "." or "..". Read only and thread-safe. For a place of your
 /// own derive from this class, or use function_storage().
-class Storage {
+class ISOBRICK_API Storage {
  public:
   virtual ~Storage() = default;
 
@@ -52,19 +54,19 @@ class Storage {
 };
 
 /// The files in a folder: "x/y" is the file y in its folder x.
-std::shared_ptr<const Storage> folder_storage(const std::filesystem::path& folder);
+ISOBRICK_API std::shared_ptr<const Storage> folder_storage(const std::filesystem::path& folder);
 
 /// The entries of a zip, which must be stored without compression. The keys are the names of the
 /// entries, or what follows "TOP/" in them where the only Zarr in the zip lies in its folder TOP.
 /// Keeps the names of the entries in memory, never their bytes. Throws DamageError for a zip that
 /// is damaged; opening a compressed or an encrypted entry throws Error.
-std::shared_ptr<const Storage> zip_storage(const std::filesystem::path& file);
+ISOBRICK_API std::shared_ptr<const Storage> zip_storage(const std::filesystem::path& file);
 /// The same of a zip that is itself an object of some storage.
-std::shared_ptr<const Storage> zip_storage(std::shared_ptr<const StoredObject> zip);
+ISOBRICK_API std::shared_ptr<const Storage> zip_storage(std::shared_ptr<const StoredObject> zip);
 
 /// Objects in memory, by key. `name` is for messages.
-std::shared_ptr<const Storage> memory_storage(std::map<std::string, std::vector<std::byte>> objects,
-                                              std::string name = "memory");
+ISOBRICK_API std::shared_ptr<const Storage> memory_storage(
+    std::map<std::string, std::vector<std::byte>> objects, std::string name = "memory");
 
 /// What a storage is made of by function_storage(). Called by several threads at once.
 struct StorageFunctions {
@@ -78,10 +80,11 @@ struct StorageFunctions {
 };
 
 /// A storage of the caller's functions; what they throw reaches the reader. `name` is for messages.
-std::shared_ptr<const Storage> function_storage(StorageFunctions functions, std::string name);
+ISOBRICK_API std::shared_ptr<const Storage> function_storage(StorageFunctions functions,
+                                                             std::string name);
 
 /// A folder or a zip, whichever `path` is. Throws Error where it is neither, and what zip_storage()
 /// does.
-std::shared_ptr<const Storage> open_storage(const std::filesystem::path& path);
+ISOBRICK_API std::shared_ptr<const Storage> open_storage(const std::filesystem::path& path);
 
 }  // namespace isobrick

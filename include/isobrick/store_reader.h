@@ -8,13 +8,14 @@
 #include <string>
 #include <vector>
 
+#include <isobrick/api.h>
 #include <isobrick/lattice.h>
 #include <isobrick/level_info.h>
 #include <isobrick/range_table.h>
 #include <isobrick/selection.h>
 #include <isobrick/storage.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// A store's metadata.
 struct StoreInfo {
@@ -36,10 +37,10 @@ struct StoreInfo {
 };
 
 /// What a user types to have the ranges of such a store computed.
-std::string index_command(const StoreInfo& info);
+ISOBRICK_API std::string index_command(const StoreInfo& info);
 
 /// The most that any level's decode_extra takes for so many threads.
-std::uint64_t decode_extra(const StoreInfo& info, int threads);
+ISOBRICK_API std::uint64_t decode_extra(const StoreInfo& info, int threads);
 
 /// Where a brick lies in the storage of its store.
 struct BrickLocation {
@@ -49,7 +50,7 @@ struct BrickLocation {
 };
 
 /// What reading bricks has cost so far, summed over threads.
-struct BrickTimes {
+struct ISOBRICK_API BrickTimes {
   double read_seconds = 0;          ///< time of reading
   double decode_seconds = 0;        ///< time of checking and decoding
   std::uint64_t bytes_read = 0;     ///< encoded bytes
@@ -66,7 +67,7 @@ struct BrickTimes {
 /// Reads a store, or an image or array that another program has written as Zarr
 /// version 2 or 3. Thread-safe after construction; keeps shard indices cached
 /// in bounded memory, never samples.
-class StoreReader {
+class ISOBRICK_API StoreReader {
  public:
   /// Opens the store in a folder or in a zip, as open_storage() does.
   explicit StoreReader(const std::filesystem::path& path, const Selection& selection = {});

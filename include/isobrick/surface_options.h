@@ -5,7 +5,7 @@
 #include <isobrick/mesh.h>
 #include <isobrick/transform.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Which surface of a lattice to extract, and what of it.
 struct SurfaceOptions {

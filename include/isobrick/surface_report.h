@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// How long a stage was busy, and with how many bytes. What all cores share (read and
 /// decode) counts the time of every thread, divided by their number.

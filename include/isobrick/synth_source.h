@@ -5,9 +5,10 @@
 #include <optional>
 #include <string_view>
 
+#include <isobrick/api.h>
 #include <isobrick/volume_source.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// The fields that can be computed.
 enum class SynthKind : std::uint8_t {
@@ -18,9 +19,9 @@ enum class SynthKind : std::uint8_t {
 };
 
 /// Its name on the command line: "sphere", "gyroid", "marschner-lobb", "mixing".
-std::string_view name_of(SynthKind kind);
+ISOBRICK_API std::string_view name_of(SynthKind kind);
 /// The kind of this name; nullopt for any other.
-std::optional<SynthKind> parse_synth_kind(std::string_view name);
+ISOBRICK_API std::optional<SynthKind> parse_synth_kind(std::string_view name);
 
 /// A volume made by computation.
 struct SynthOptions {
@@ -41,10 +42,10 @@ struct SynthOptions {
 /// field itself (isovalue 0); unsigned ones reach from 0 to their maximum
 /// (127.5 for u8), signed ones from their minimum to their maximum (−0.5). The
 /// isovalue lies between two integers, so that no sample equals it.
-double default_isovalue(ScalarType type);
+ISOBRICK_API double default_isovalue(ScalarType type);
 
 /// Samples are the same on every machine, whatever the boxes they are read by;
 /// random access from any thread. Throws UsageError for options that make no sense.
-std::unique_ptr<VolumeSource> make_synth(const SynthOptions& options);
+ISOBRICK_API std::unique_ptr<VolumeSource> make_synth(const SynthOptions& options);
 
 }  // namespace isobrick

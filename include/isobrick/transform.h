@@ -5,7 +5,7 @@
 
 #include <isobrick/vec.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// From index space to world space:
 /// world = origin + direction · (spacing ∘ index).

@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Signed 64-bit lattice arithmetic: extents, coordinates and offsets all fit,
 /// and a negative intermediate result is a bug that shows.

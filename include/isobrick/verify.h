@@ -5,10 +5,11 @@
 #include <string>
 #include <vector>
 
+#include <isobrick/api.h>
 #include <isobrick/progress.h>
 #include <isobrick/selection.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// What was checked, and what is wrong.
 struct VerifyReport {
@@ -30,8 +31,9 @@ struct VerifyReport {
 /// counts as damage. Within `memory` bytes, with fewer threads where they take too much of it.
 /// Throws when the root cannot be read, and UsageError when the budget is too small, with the
 /// least that is not.
-VerifyReport verify(const std::filesystem::path& store, int threads = 0,
-                    Progress& progress = no_progress(), const Selection& selection = {},
-                    std::uint64_t memory = std::uint64_t{1} << 30);
+ISOBRICK_API VerifyReport verify(const std::filesystem::path& store, int threads = 0,
+                                 Progress& progress = no_progress(),
+                                 const Selection& selection = {},
+                                 std::uint64_t memory = std::uint64_t{1} << 30);
 
 }  // namespace isobrick

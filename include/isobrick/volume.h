@@ -9,7 +9,7 @@
 #include <isobrick/transform.h>
 #include <isobrick/vec.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Samples of the caller's, in memory or behind a function. Owns nothing: memory and what the
 /// function uses must stay as they are while the volume is used.

@@ -3,6 +3,7 @@
 #include <memory>
 #include <optional>
 
+#include <isobrick/api.h>
 #include <isobrick/extract.h>
 #include <isobrick/mesh.h>
 #include <isobrick/progress.h>
@@ -11,7 +12,7 @@
 #include <isobrick/volume.h>
 #include <isobrick/volume_source.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Isosurfaces of a volume without a store. The first extraction finds the ranges of the blocks of
 /// 16³ cells, later ones read only what their isovalue touches. The mesh is that of a store of the
@@ -22,7 +23,7 @@ namespace isobrick {
 ///
 /// Of ExtractOptions, `level`, `index` and the members for a GPU do not matter; `inside` is above
 /// by default. `memory` bounds all but the mesh of an extraction into a Mesh.
-class VolumeExtractor {
+class ISOBRICK_API VolumeExtractor {
  public:
   /// Throws UsageError for a volume that makes no sense: no samples, an extent that is not positive
   /// or overflows, strides of which one is 0.
@@ -52,10 +53,10 @@ class VolumeExtractor {
 };
 
 /// A surface of a volume in one go: VolumeExtractor.
-Mesh extract(const Volume& volume, const ExtractOptions& options,
-             Progress& progress = no_progress());
+ISOBRICK_API Mesh extract(const Volume& volume, const ExtractOptions& options,
+                          Progress& progress = no_progress());
 /// The same into a sink.
-SurfaceReport extract(const Volume& volume, const ExtractOptions& options, MeshSink& sink,
-                      Progress& progress = no_progress());
+ISOBRICK_API SurfaceReport extract(const Volume& volume, const ExtractOptions& options,
+                                   MeshSink& sink, Progress& progress = no_progress());
 
 }  // namespace isobrick

@@ -7,12 +7,13 @@
 #include <string>
 #include <string_view>
 
+#include <isobrick/api.h>
 #include <isobrick/array_view.h>
 #include <isobrick/transform.h>
 #include <isobrick/vec.h>
 #include <isobrick/volume_source.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// How the bytes of a sample lie in a file.
 enum class ByteOrder : std::uint8_t { little, big };
@@ -34,15 +35,17 @@ struct WorldRegion {
 
 /// The samples of a volume of so many that are requested. Throws UsageError for a region that is
 /// empty or leaves the volume.
-Box3 resolve_region(const RegionRequest& region, Int3 extent);
+ISOBRICK_API Box3 resolve_region(const RegionRequest& region, Int3 extent);
 
 /// The bounds of a region in the index space of a volume, lower corner first; in one whose axes are
 /// turned, those of the box around it.
-std::array<Vec3d, 2> index_bounds(const WorldRegion& region, const Transform& transform);
+ISOBRICK_API std::array<Vec3d, 2> index_bounds(const WorldRegion& region,
+                                               const Transform& transform);
 
 /// The smallest box of samples that covers what a volume has of `region`; in a volume whose axes
 /// are turned, the box around the region. Throws UsageError where they do not touch.
-Box3 covering_samples(const WorldRegion& region, const Transform& transform, Int3 extent);
+ISOBRICK_API Box3 covering_samples(const WorldRegion& region, const Transform& transform,
+                                   Int3 extent);
 
 /// What the caller specifies about a volume. The first four members are for raw files, where
 /// they override a header beside the file and the file's name. The others
@@ -72,18 +75,18 @@ struct VolumeRequest {
 
 /// Describes a volume by its file and the request. Throws UsageError for
 /// extents and geometry that make no sense.
-VolumeInfo describe_volume(const std::string& path, Int3 extent, ScalarType type,
-                           Transform transform, const VolumeRequest& request);
+ISOBRICK_API VolumeInfo describe_volume(const std::string& path, Int3 extent, ScalarType type,
+                                        Transform transform, const VolumeRequest& request);
 
 /// Throws UsageError when the caller describes raw samples although the file, a
 /// `format` ("a NIfTI file"), describes itself.
-void refuse_raw_description(const std::string& path, std::string_view format,
-                            const VolumeRequest& request);
+ISOBRICK_API void refuse_raw_description(const std::string& path, std::string_view format,
+                                         const VolumeRequest& request);
 
 /// Throws UsageError for a grid or bounds of grids where there are none.
-void refuse_grid(const std::string& path, const VolumeRequest& request);
+ISOBRICK_API void refuse_grid(const std::string& path, const VolumeRequest& request);
 
 /// Throws UsageError for a channel or a time that a file with one of each lacks.
-void refuse_selection(const std::string& path, const VolumeRequest& request);
+ISOBRICK_API void refuse_selection(const std::string& path, const VolumeRequest& request);
 
 }  // namespace isobrick

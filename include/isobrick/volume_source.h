@@ -7,11 +7,12 @@
 #include <string>
 #include <vector>
 
+#include <isobrick/api.h>
 #include <isobrick/scalar.h>
 #include <isobrick/transform.h>
 #include <isobrick/vec.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// What is known of a volume before any sample is read.
 struct VolumeInfo {
@@ -28,7 +29,7 @@ struct VolumeInfo {
 };
 
 /// A volume that can be read piece by piece. Never holds the whole of it.
-class VolumeSource {
+class ISOBRICK_API VolumeSource {
  public:
   virtual ~VolumeSource() = default;
 

@@ -4,7 +4,7 @@
 
 #include "io/bytes/byte_stream.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// What base64 `text` stands for. Blanks and line ends are passed over; padding
 /// may stand between pieces that were encoded one by one. The stream ends at a

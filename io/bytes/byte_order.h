@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <cstring>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 template <class Word>
 void swap_words(std::byte* bytes, std::size_t count) {

@@ -10,7 +10,7 @@
 #include "core/cancel.h"
 #include "io/bytes/byte_order.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 void ByteStream::skip(std::uint64_t size) {
   std::array<std::byte, 65536> ignored;

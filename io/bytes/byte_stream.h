@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <string>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Bytes that come in order, from the first to the last, each once: a part of
 /// a file, what a compressed file unpacks to, standard input. One thread at a time.

@@ -7,7 +7,7 @@
 
 #include <isobrick/error.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 class ConcatStream final : public ByteStream {

@@ -7,7 +7,7 @@
 
 #include "io/bytes/byte_stream.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// `count` streams of equal length one after the other, `open(i)` opens one: only
 /// one of them is open at a time. `name` is for messages.

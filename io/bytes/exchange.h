@@ -2,7 +2,7 @@
 
 #include <filesystem>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Lets two things in an open folder change places: in one step where the file system can, else
 /// by exchange_by_renames(). Throws Error; both are where they were then.

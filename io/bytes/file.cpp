@@ -11,7 +11,7 @@
 
 #include <isobrick/error.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 struct stat status_of(const File& file) {

@@ -8,7 +8,7 @@
 #include <string>
 #include <utility>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Owns an open file descriptor; a negative one stands for none.
 class UniqueFd {

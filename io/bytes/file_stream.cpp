@@ -13,7 +13,7 @@
 #include <isobrick/error.h>
 #include "core/cancel.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 class FileStream final : public ByteStream {

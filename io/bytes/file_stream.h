@@ -6,7 +6,7 @@
 #include "io/bytes/byte_stream.h"
 #include "io/bytes/file.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// The bytes of a file from `begin` to its end.
 std::unique_ptr<ByteStream> make_file_stream(File file, std::uint64_t begin = 0);

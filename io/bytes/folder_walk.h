@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 // The standard library's iterators over folders end the program where memory is short.
 

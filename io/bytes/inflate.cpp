@@ -4,7 +4,7 @@
 
 #include <cstdint>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 InflateResult::Status status_of(int code) {

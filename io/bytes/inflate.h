@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <span>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// The frame of a deflate stream, with its checksum.
 enum class Wrapper : unsigned char {

@@ -5,7 +5,7 @@
 #include "io/bytes/byte_stream.h"
 #include "io/bytes/inflate.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// What `packed` unpacks to, checksums compared. Throws DamageError where the
 /// compressed bytes are damaged or end too early.

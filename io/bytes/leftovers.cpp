@@ -20,7 +20,7 @@
 #include "core/digits.h"
 #include "io/bytes/folder_walk.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 namespace fs = std::filesystem;

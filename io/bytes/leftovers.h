@@ -9,7 +9,7 @@
 // Outputs grow under names such as mesh.ply.partial-4711-0-5a9c01ef. A process holds a lock on what
 // it writes so, and the lock ends with the process: what is not locked is what a killed one left.
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// A file or folder under such a name, locked as long as `fd` is open.
 struct Temporary {

@@ -10,7 +10,7 @@
 #include <isobrick/error.h>
 #include "io/bytes/file.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// All that are mapped.

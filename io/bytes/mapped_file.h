@@ -5,7 +5,7 @@
 #include <span>
 #include <string>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// A regular file in memory, read only. Like everything mapped, it must not be cut short by others
 /// in the meantime.

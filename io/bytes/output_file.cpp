@@ -17,7 +17,7 @@
 #include "io/bytes/leftovers.h"
 #include "io/bytes/rename.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 FileWriter open_standard_output() {

@@ -10,7 +10,7 @@
 
 #include "io/bytes/file.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Appends to a file through a large buffer.
 class FileWriter {

@@ -16,7 +16,7 @@
 #include "io/bytes/exchange.h"
 #include "io/bytes/folder_walk.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 namespace fs = std::filesystem;

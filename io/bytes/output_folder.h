@@ -4,7 +4,7 @@
 
 #include "io/bytes/file.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// A folder that is written to, such as a store. Every path that a function takes is that of
 /// something below the folder, written as root() / …. No function follows a symbolic link below

@@ -3,7 +3,7 @@
 #include <filesystem>
 #include <span>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Throws UsageError when replacing `output` would take away something that the command still
 /// needs: `output` is one of its inputs, a file in one (in a store), or a folder that holds an

@@ -10,7 +10,7 @@
 #include "io/bytes/output_guard.h"
 #include "io/bytes/rename.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 namespace fs = std::filesystem;

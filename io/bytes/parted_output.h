@@ -9,7 +9,7 @@
 #include "io/bytes/leftovers.h"
 #include "io/bytes/output_file.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// A file and, where it needs them, parts in a folder beside it, `path`.parts: written under
 /// temporary names and moved to their places together.

@@ -7,7 +7,7 @@
 
 #include <isobrick/error.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 void write_png(OutputFile& out, int width, int height, std::span<const std::uint8_t> rgb) {
   png_image image{};

@@ -6,7 +6,7 @@
 
 #include "io/bytes/output_file.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Writes `width` × `height` pixels, rows from the top, 3 bytes (sRGB) each, to
 /// `out` and publishes it.

@@ -6,7 +6,7 @@
 
 #include <cerrno>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 int rename_no_replace(const std::filesystem::path& from, const std::filesystem::path& to) {
   if (::renameat2(AT_FDCWD, from.c_str(), AT_FDCWD, to.c_str(), RENAME_NOREPLACE) == 0) return 0;

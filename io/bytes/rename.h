@@ -2,7 +2,7 @@
 
 #include <filesystem>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Renames a file or folder, replacing nothing: 0, EEXIST when something has the name `to` already,
 /// or the errno of another failure.

@@ -15,7 +15,7 @@
 #include <isobrick/error.h>
 #include "core/printable.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 constexpr std::size_t kBuffer = 65536;

@@ -5,7 +5,7 @@
 #include <isobrick/scalar.h>
 #include "io/bytes/byte_stream.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Samples of `type` in native byte order, from numbers in a text that blanks,
 /// commas or line ends separate. Throws Error, with the position, for words that are no

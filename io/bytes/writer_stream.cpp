@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <string_view>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 WriterStream::WriterStream(FileWriter& file) : std::ostream(nullptr), buffer_(file) {
   rdbuf(&buffer_);

@@ -6,7 +6,7 @@
 
 #include "io/bytes/output_file.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// A standard stream over a FileWriter, for a library that writes to one. It may go back and
 /// replace bytes. Every failure is thrown as the Error that the FileWriter throws, at once.

@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// Bytes of the character at the front, 0 when it is no UTF-8 or not allowed in XML.

@@ -3,7 +3,7 @@
 #include <string>
 #include <string_view>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Whether XML can hold the text: UTF-8 without control characters.
 bool is_xml_text(std::string_view text);

@@ -2,7 +2,7 @@
 
 #include <string_view>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Whether a file that begins with these bytes is a zip: with an entry, or without any.
 inline bool is_zip_head(std::string_view head) {

@@ -11,7 +11,7 @@
 #include <isobrick/error.h>
 #include "io/bytes/inflate.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 constexpr std::uint64_t kMaxBlock = std::uint64_t{64} << 20;

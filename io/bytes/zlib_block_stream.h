@@ -5,7 +5,7 @@
 
 #include "io/bytes/byte_stream.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// How VTK cuts an array into blocks that are compressed one by one.
 struct BlockTable {

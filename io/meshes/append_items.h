@@ -6,7 +6,7 @@
 
 #include "io/bytes/output_file.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Appends `count` items of kItem bytes each: put(to, i) writes item i in place.
 template <std::size_t kItem, class Put>

@@ -11,7 +11,7 @@
 #include "core/box_union.h"
 #include "core/length_unit.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 using nlohmann::ordered_json;

@@ -10,7 +10,7 @@
 #include <isobrick/vec.h>
 #include "io/bytes/output_file.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Smallest and largest of what was included, axis by axis.
 struct Bounds3f {

@@ -3,7 +3,7 @@
 #include <utility>
 #include <vector>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 constexpr std::string_view kPartExtension = ".bin";

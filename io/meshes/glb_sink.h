@@ -7,7 +7,7 @@
 #include "io/meshes/glb_scene.h"
 #include "io/meshes/parted_mesh_sink.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 struct GlbOptions {
   /// Positions and normals of 16 bits (KHR_mesh_quantization): positions lie on

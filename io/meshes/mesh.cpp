@@ -4,7 +4,7 @@
 
 #include <isobrick/mesh_file_sink.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 MeshHeader header_of_mesh(const Mesh& mesh) {

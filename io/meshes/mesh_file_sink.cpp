@@ -14,7 +14,7 @@
 #include "io/meshes/stl_sink.h"
 #include "io/meshes/vtp_sink.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 struct NamedFormat {

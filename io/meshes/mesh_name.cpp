@@ -5,7 +5,7 @@
 #include <iterator>
 #include <string_view>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// What `isobrick render` reads; the formats that are written are among them.

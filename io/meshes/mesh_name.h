@@ -3,7 +3,7 @@
 #include <filesystem>
 #include <string>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Whether a file goes by the extension of a mesh, of any format that is read and drawn.
 bool has_mesh_name(const std::filesystem::path& file);

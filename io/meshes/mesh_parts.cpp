@@ -4,7 +4,7 @@
 #include <memory>
 #include <vector>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 constexpr std::uint64_t kRun = FileWriter::kBuffer / sizeof(Triangle);

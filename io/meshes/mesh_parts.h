@@ -8,7 +8,7 @@
 #include <isobrick/mesh.h>
 #include "io/bytes/output_file.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// A run of a welded mesh's triangles with all the vertices that they name. A
 /// vertex that several parts name is repeated in each; every vertex is the own

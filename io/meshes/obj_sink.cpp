@@ -9,7 +9,7 @@
 #include <span>
 #include <vector>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// Items that one task turns into text.

@@ -8,7 +8,7 @@
 #include <isobrick/mesh.h>
 #include "io/bytes/output_file.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Writes a welded mesh as Wavefront OBJ: `v x y z` [`vn x y z`] for each vertex,
 /// then `f a b c` (`f a//a b//b c//c` with normals), numbers from 1 on. Decimals

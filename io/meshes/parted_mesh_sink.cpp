@@ -4,7 +4,7 @@
 
 #include "io/meshes/vertex_rows.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 PartedMeshSink::PartedMeshSink(std::string path, bool force, std::uint64_t part_triangles)
     : out_(std::move(path), force),

@@ -11,7 +11,7 @@
 #include "io/bytes/parted_output.h"
 #include "io/meshes/mesh_parts.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Keeps a welded mesh in scratch files until it is whole; then a format writes it, in one file or
 /// in parts of `part_triangles`.

@@ -10,7 +10,7 @@
 #include "io/meshes/append_items.h"
 #include "io/meshes/vertex_rows.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 static_assert(std::endian::native == std::endian::little, "samples are written as they lie");

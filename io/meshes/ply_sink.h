@@ -6,7 +6,7 @@
 #include <isobrick/mesh.h>
 #include "io/bytes/output_file.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Writes a welded mesh as binary little-endian PLY: float x y z [nx ny nz],
 /// faces as `list uchar uint vertex_indices`. The vertex numbers are uint, not

@@ -10,7 +10,7 @@
 #include <isobrick/error.h>
 #include "io/meshes/append_items.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 static_assert(std::endian::native == std::endian::little, "floats are written as they lie");

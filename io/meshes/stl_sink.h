@@ -6,7 +6,7 @@
 #include <isobrick/mesh.h>
 #include "io/bytes/output_file.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Writes binary STL: corners and a facet normal for each triangle, no sharing
 /// of vertices. Degenerate triangles get the normal 0.

@@ -5,7 +5,7 @@
 
 #include "io/meshes/append_items.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 static_assert(std::endian::native == std::endian::little, "floats are written as they lie");
 static_assert(sizeof(Vec3f) == 12);

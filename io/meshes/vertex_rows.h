@@ -5,7 +5,7 @@
 #include <isobrick/mesh.h>
 #include "io/bytes/output_file.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Bytes of one vertex as append_rows writes it.
 constexpr std::size_t row_bytes(bool normals) { return (normals ? 2 : 1) * sizeof(Vec3f); }

@@ -8,7 +8,7 @@
 
 #include "io/meshes/append_items.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 static_assert(std::endian::native == std::endian::little, "numbers are written as they lie");

@@ -7,7 +7,7 @@
 #include <isobrick/mesh.h>
 #include "io/bytes/output_file.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// A VTK PolyData file (.vtp) of one piece: XML, then the arrays appended raw,
 /// little endian, each behind its length in bytes as UInt64: points, normals,

@@ -11,7 +11,7 @@
 #include "io/meshes/mesh_parts.h"
 #include "io/meshes/vertex_rows.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 constexpr std::string_view kPartExtension = ".vtp";

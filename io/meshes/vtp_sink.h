@@ -8,7 +8,7 @@
 #include "io/meshes/parted_mesh_sink.h"
 #include "io/meshes/vtp_layout.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Writes a welded mesh as one VTK PolyData file; see VtpLayout.
 class VtpSink final : public MeshSink {

@@ -6,7 +6,7 @@
 
 #include <isobrick/error.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 constexpr Index kMaxSamples = std::numeric_limits<Index>::max() / 8;

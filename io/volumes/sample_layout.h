@@ -14,7 +14,7 @@
 #include <isobrick/volume_source.h>
 #include "io/bytes/byte_order.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Where the samples of a volume lie among the bytes of a file or a stream.
 struct SampleLayout {

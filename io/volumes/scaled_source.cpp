@@ -6,7 +6,7 @@
 #include <limits>
 #include <utility>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 class ScaledSource final : public VolumeSource {

@@ -6,7 +6,7 @@
 
 #include <isobrick/volume_source.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// From stored to real values: slope · stored + intercept.
 struct ValueScale {

@@ -12,7 +12,7 @@
 #include <isobrick/error.h>
 #include <isobrick/lattice.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 constexpr Int3 kEach{1, 1, 1};

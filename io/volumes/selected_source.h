@@ -4,7 +4,7 @@
 
 #include <isobrick/volume_request.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// The samples of `source` that `roi`, `region` and `stride` of the request select, with `nodata`
 /// as NaN; the source itself where the request selects all. A stream stays one. Takes a plane of

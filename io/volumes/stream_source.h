@@ -6,7 +6,7 @@
 #include "io/bytes/byte_stream.h"
 #include "io/volumes/sample_layout.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// What becomes of bytes that follow the samples.
 enum class AfterEnd : unsigned char {

@@ -12,7 +12,7 @@
 #include "core/length_unit.h"
 #include "core/vectors.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();

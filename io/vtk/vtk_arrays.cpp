@@ -12,7 +12,7 @@
 #include "io/bytes/text_stream.h"
 #include "io/bytes/zlib_block_stream.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 std::unique_ptr<ByteStream> open_at(const VtkFile& file, std::uint64_t begin) {

@@ -7,7 +7,7 @@
 #include "io/bytes/byte_stream.h"
 #include "io/vtk/vtk_file.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 enum class VtkEncoding : std::uint8_t { ascii, base64, raw };
 

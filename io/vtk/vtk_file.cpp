@@ -2,7 +2,7 @@
 
 #include <exception>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 void VtkFile::fail(const std::string& what) const {
   refuse(path, what);

@@ -8,7 +8,7 @@
 
 #include "io/bytes/byte_stream.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// A VTK file in XML, whatever it holds.
 struct VtkFile {

@@ -12,7 +12,7 @@
 
 struct XML_ParserStruct;
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Parses the XML of a VTK file. The readers of the formats derive from it and take the elements
 /// that they need.

@@ -21,7 +21,7 @@
 #include "io/bytes/leftovers.h"
 #include "io/bytes/output_file.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 namespace fs = std::filesystem;

@@ -7,7 +7,7 @@
 #include <isobrick/progress.h>
 #include "io/bytes/file.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// One store in a folder of stores: CACHE/NAME with `store.zarr`, what it was made of, and a lock.
 /// While an entry is held, no process removes it.

@@ -22,7 +22,7 @@
 #include "pipeline/convert/store_source.h"
 #include "pipeline/index/add_ranges.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 namespace fs = std::filesystem;

@@ -7,7 +7,7 @@
 #include "bricks/zarr/codec.h"
 #include "core/copy_box.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 double value_of(ScalarType type, std::uint64_t bits) {

@@ -12,7 +12,7 @@
 #include "pipeline/convert/convert_journal.h"
 #include "pipeline/index/value_counts.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// A brick on its way to its shard.
 struct PackedBrick {

@@ -19,7 +19,7 @@
 #include "pipeline/slab_file.h"
 #include "pipeline/workers.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 std::size_t bytes_of(Int3 extent, ScalarType type) {

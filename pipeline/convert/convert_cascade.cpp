@@ -8,7 +8,7 @@
 
 #include "pipeline/convert/downsample.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 void read_box(VolumeSource& source, Box3 box, std::byte* out) {
   if (!source.parallel()) return source.read(box, out);

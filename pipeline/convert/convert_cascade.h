@@ -8,7 +8,7 @@
 #include "pipeline/convert/convert_level.h"
 #include "pipeline/convert/convert_plan.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Reads `box` into `out`: with several threads where the source allows it.
 void read_box(VolumeSource& source, Box3 box, std::byte* out);

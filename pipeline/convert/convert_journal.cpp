@@ -9,7 +9,7 @@
 #include <isobrick/error.h>
 #include "bricks/zarr/store_names.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// Spreads a brick's place and checksum over 64 bits (the finaliser of

@@ -9,7 +9,7 @@
 #include "io/bytes/file.h"
 #include "io/bytes/output_folder.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Remembers, beside the unfinished store, what the input looked like: one
 /// checksum for each layer of bricks. A resumed conversion reads the input

@@ -4,7 +4,7 @@
 
 #include "pipeline/convert/in_order.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 LevelWriter::LevelWriter(StoreWriter& store, const StoreLayout& layout, int level,
                          int bricks_in_flight, ConvertJournal* journal, ValueCounts* counts,
                          Progress& progress)

@@ -11,7 +11,7 @@
 #include "pipeline/convert/convert_journal.h"
 #include "pipeline/index/range_scan.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Writes one level of a store: bricks, encoded in parallel, and ranges. Counts its samples.
 class LevelWriter {

@@ -16,7 +16,7 @@
 #include "pipeline/program_memory.h"
 #include "pipeline/slab_piece.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// What a reader takes.

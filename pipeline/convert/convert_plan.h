@@ -7,7 +7,7 @@
 #include <isobrick/volume_source.h>
 #include "bricks/store_writer.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// What the store of `volume` will look like; `sparse`: its bricks must suit SparsePyramid. Throws
 /// UsageError for options that make no sense.

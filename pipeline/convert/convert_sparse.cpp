@@ -19,7 +19,7 @@
 #include "pipeline/convert/in_order.h"
 #include "pipeline/program_memory.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// Bricks that one brick of the next level is made of, at most.

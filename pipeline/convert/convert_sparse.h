@@ -13,7 +13,7 @@
 #include "pipeline/convert/sparse_ranges.h"
 #include "pipeline/index/value_counts.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Converts a source that knows where it is the fill value: only the bricks that
 /// may be something else are read, encoded and downsampled, so that time and memory

@@ -15,7 +15,7 @@
 #include "io/bytes/folder_walk.h"
 #include "io/bytes/output_guard.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 namespace fs = std::filesystem;

@@ -7,7 +7,7 @@
 #include "io/bytes/file.h"
 #include "io/bytes/output_folder.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Where the store `out` grows until it takes its place: `out` + ".partial".
 std::filesystem::path staging_path(const std::filesystem::path& out);

@@ -7,7 +7,7 @@
 
 #include "bricks/zarr/codec.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// Samples that are read, but for bricks that are larger, and of these the ones that are kept.

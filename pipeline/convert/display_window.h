@@ -5,7 +5,7 @@
 #include <isobrick/image_metadata.h>
 #include <isobrick/store_reader.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// The values between which viewers show a store at first: the percentiles 0.5 and 99.5 of its
 /// samples, within the range of level 0. They come from a level of few samples or, where there

@@ -9,7 +9,7 @@
 #include <limits>
 #include <numbers>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// The four rows that become one. At an odd end, and along an axis that is not halved, a row comes

@@ -7,7 +7,7 @@
 #include <isobrick/transform.h>
 #include <isobrick/vec.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Halves every axis.
 inline constexpr Int3 kHalveAll{2, 2, 2};

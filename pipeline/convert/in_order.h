@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <vector>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Takes things one after the other, works on them with all threads, and delivers them in the
 /// order in which they were taken; at most `in_flight` (at least 1) are under way. This

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// Calls f(brick) for those that are not known to be the fill value, found by halving a box

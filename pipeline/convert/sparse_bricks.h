@@ -8,7 +8,7 @@
 #include <isobrick/lattice.h>
 #include <isobrick/volume_source.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// A brick that may be something else than the fill value.
 struct SparseBrick {

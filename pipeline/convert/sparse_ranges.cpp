@@ -13,7 +13,7 @@
 #include "bricks/ranges/brick_checksums.h"
 #include "pipeline/index/range_scan.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 constexpr Int3 kBlockExtent{kBlockEdge, kBlockEdge, kBlockEdge};

@@ -10,7 +10,7 @@
 #include <isobrick/lattice.h>
 #include "bricks/store_writer.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// The ranges of what one brick's samples touch: its own blocks and, below it
 /// along each axis, those of its neighbours that see its first samples.

@@ -11,7 +11,7 @@
 #include "io/volumes/selected_source.h"
 #include "pipeline/slab_reader.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 class StoreSource final : public VolumeSource {

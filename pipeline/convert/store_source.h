@@ -6,7 +6,7 @@
 #include <isobrick/volume_request.h>
 #include <isobrick/volume_source.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// The finest level of a store, or of another program's Zarr, as the input of a
 /// conversion. Throws what StoreReader does, and UsageError for a request with

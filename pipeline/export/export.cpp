@@ -26,7 +26,7 @@
 #include "pipeline/stored_bricks.h"
 #include "pipeline/workers.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 static_assert(std::endian::native == std::endian::little, "raw files are written as they are");

@@ -21,7 +21,7 @@
 #include "pipeline/workers.h"
 #include "surface/cpu_extractor.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// The extraction is not much faster with more.

@@ -5,7 +5,7 @@
 #include <isobrick/volume_source.h>
 #include "io/bytes/output_file.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Writes the isosurface of `box` (samples of a level) to `file` as a level set: distances
 /// from the triangles that extract() makes, negative inside.

@@ -7,7 +7,7 @@
 #include <isobrick/error.h>
 #include "pipeline/program_memory.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// Samples along an edge of a tree's nodes: leaves, and the two levels above.

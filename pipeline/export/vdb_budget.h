@@ -4,7 +4,7 @@
 
 #include <isobrick/vec.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// What OpenVDB and the libraries that it needs take once they are loaded, beside kProgramBytes.
 inline constexpr std::uint64_t kVdbLibraryBytes = std::uint64_t{32} << 20;

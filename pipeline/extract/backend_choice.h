@@ -11,7 +11,7 @@
 #include "pipeline/extract/extract_tiles.h"
 #include "pipeline/extract/gpu_backend.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Whether the GPU is to make surfaces like this one, of which `active_blocks` are to be done: what
 /// has kernels and promises to be faster there. For Backend::cuda, UsageError for what has no

@@ -22,7 +22,7 @@
 #include "stream/tile_stream.h"
 #include "surface/case_rule.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// Groups of tiles that are looked at: enough for 10 % where groups differ by

@@ -18,7 +18,7 @@
 #include "pipeline/extract/resident_pass.h"
 #include "pipeline/workers.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// What becomes of a device and of the search for tiles while the active parts are counted.

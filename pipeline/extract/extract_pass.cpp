@@ -10,7 +10,7 @@
 #include "pipeline/workers.h"
 #include "stream/brick_cache.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// A pass that is under way.

@@ -6,7 +6,7 @@
 
 #include "pipeline/extract/backend_choice.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Surfaces that are to be made, in their order: a request, a sink and a report for each.
 struct PassSurfaces {

@@ -15,7 +15,7 @@
 #include "stream/brick_slots.h"
 #include "stream/tile_stream.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// The ranges of bricks that are compared with decoded ones, and one chunk being read.

@@ -9,7 +9,7 @@
 #include "stream/block_search.h"
 #include "surface/cpu_extractor.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 class GpuSession;
 

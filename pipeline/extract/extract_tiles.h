@@ -6,7 +6,7 @@
 #include "stream/batch_decoder.h"
 #include "stream/tile_stream.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// The tiles that are active at any of a pass's isovalues_of(). `store` must outlive them.
 inline TileStream tiles_of(const StoreReader& store, int level, PassRequests requests) {

@@ -10,7 +10,7 @@
 #include "gpu/stream/brick_pool.h"
 #include "gpu/stream/gpu_extractor.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// Bricks in host memory, which the device reads.

@@ -11,7 +11,7 @@
 // The CUDA backend as the pipeline sees it: gpu_backend.cpp where it is built, else
 // no_gpu_backend.cpp.
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Whether this program has the CUDA backend.
 bool built_with_cuda();

@@ -7,7 +7,7 @@
 #include <isobrick/error.h>
 #include "core/length_unit.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// World-space bounds of the samples from `first` to `last`.

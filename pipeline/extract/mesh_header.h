@@ -6,7 +6,7 @@
 #include <isobrick/transform.h>
 #include "core/tile.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Throws Error where the coordinates of a mesh do not fit 32 bits: `name` is of the volume.
 void check_coordinates(const Transform& transform, Int3 extent, const std::string& name);

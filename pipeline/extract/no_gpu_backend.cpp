@@ -2,7 +2,7 @@
 #include "pipeline/extract/gpu_backend.h"
 #include "pipeline/extract/resident_pass.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 [[noreturn]] void refuse() {

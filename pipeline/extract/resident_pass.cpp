@@ -13,7 +13,7 @@
 #include "pipeline/extract/sink_writers.h"
 #include "pipeline/workers.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// The driver gets memory that is allocated in the order of a stream in pieces of so much.

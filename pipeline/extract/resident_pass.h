@@ -6,7 +6,7 @@
 
 #include "pipeline/extract/extract_pass.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// What came of a resident pass.
 struct ResidentPassResult {

@@ -5,7 +5,7 @@
 #include <isobrick/error.h>
 #include "bricks/stored_index.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 namespace {
 

@@ -7,7 +7,7 @@
 #include <future>
 #include <vector>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// Ends a write because another one failed.

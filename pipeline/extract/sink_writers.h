@@ -7,7 +7,7 @@
 
 #include <isobrick/mesh.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Writes a mesh to each sink at the same time and finishes the sinks. `write` is called with a
 /// sink's number and the sink to write to, each time on another thread. `written` is called on the

@@ -4,7 +4,7 @@
 
 #include "core/morton.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// The finalizer of SplitMix64, from its second number on.

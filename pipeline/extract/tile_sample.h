@@ -6,7 +6,7 @@
 
 #include "core/tile.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Active tiles of one cube of 2×2×2: they follow each other in Morton order,
 /// and with bricks of 64³ samples they lie in one.

@@ -5,7 +5,7 @@
 #include <isobrick/store_reader.h>
 #include "bricks/ranges/stored_histogram.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// The counts of level 0 that a store keeps; nullopt if it keeps none. Throws DamageError where
 /// they are damaged.

@@ -5,7 +5,7 @@
 #include <limits>
 #include <numeric>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 std::uint64_t sum_of(const Histogram& h) {

@@ -11,7 +11,7 @@
 #include "bricks/level_set.h"
 #include "pipeline/value_text.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 struct Preset {

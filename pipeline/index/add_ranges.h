@@ -8,7 +8,7 @@
 #include <isobrick/store_reader.h>
 #include "io/bytes/file.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Computes the ranges of all levels and adds them to the store, which must be
 /// opened anew to find them; what it had stays until all new ones are there.

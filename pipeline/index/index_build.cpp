@@ -23,7 +23,7 @@
 #include "pipeline/program_memory.h"
 #include "pipeline/workers.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 namespace fs = std::filesystem;

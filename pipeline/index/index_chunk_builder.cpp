@@ -15,7 +15,7 @@
 #include "pipeline/program_memory.h"
 #include "pipeline/slab_reader.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 constexpr Index kEdge = IndexLayout::kBrick;

@@ -9,7 +9,7 @@
 #include <isobrick/store_reader.h>
 #include "bricks/ranges/index_layout.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Makes the parts of a level's index chunks from the level's ranges and, for
 /// leaves below 16, from its samples. Bricks whose range no isovalue stabs have

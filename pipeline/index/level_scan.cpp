@@ -6,7 +6,7 @@
 
 #include "pipeline/slab_piece.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 void scan_level(const StoreReader& store, int level, std::size_t piece_bytes, LevelRanges& ranges,
                 const BrickFailure& failure, const RangeEmit& blocks, const RangeEmit& bricks,

@@ -8,7 +8,7 @@
 #include "pipeline/index/value_counts.h"
 #include "pipeline/slab_reader.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Reads all samples of a level, in pieces of at most `piece_bytes` (or of one
 /// brick), and feeds them to `ranges`, whose finished layers go to `blocks` and

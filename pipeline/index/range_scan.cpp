@@ -9,7 +9,7 @@
 #include "bricks/ranges/range_format.h"
 #include "index/row_ranges.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// Bytes of a row that are reduced at a time: its bounds and a few

@@ -10,7 +10,7 @@
 #include <isobrick/lattice.h>
 #include <isobrick/range.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Takes a finished layer of ranges: the items it covers and their pairs
 /// (lo, hi) of the sample type, C order [z, y, x, 2].

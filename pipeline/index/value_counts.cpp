@@ -13,7 +13,7 @@
 
 #include <isobrick/range.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// Samples that are looked at together. Where all are equal, they are counted at once.

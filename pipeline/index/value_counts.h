@@ -7,7 +7,7 @@
 #include <isobrick/lattice.h>
 #include "bricks/ranges/stored_histogram.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Counts samples by their values, in bins as narrow as a store keeps them (SampleCounts). The
 /// result depends on nothing but the samples: not on their order, the calls or the threads.

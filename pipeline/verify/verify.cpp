@@ -20,7 +20,7 @@
 #include "pipeline/verify/verify_index.h"
 #include "pipeline/workers.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 constexpr std::size_t kMaxDamages = 1000;

@@ -13,7 +13,7 @@
 #include "pipeline/workers.h"
 #include "stream/index_search.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// For making the parts anew: more is no faster.

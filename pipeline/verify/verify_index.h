@@ -8,7 +8,7 @@
 #include <isobrick/store_reader.h>
 #include "bricks/stored_index.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Reads all of one index: every part's checksum and structure, and whether it is
 /// what the store's ranges and samples make. `damage` gets a line for each part that

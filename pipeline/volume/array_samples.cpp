@@ -8,7 +8,7 @@
 
 #include "core/copy_rows.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// Copies samples of any strides as a loop over the axes, the nearest samples innermost.

@@ -8,7 +8,7 @@
 #include <isobrick/scalar.h>
 #include "surface/tile_samples.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Samples of a box in memory: where the first one is, and bytes from one to the next along x, y,
 /// z.

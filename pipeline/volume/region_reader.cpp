@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 RegionReader::~RegionReader() {
   if (reading_.valid()) reading_.wait();

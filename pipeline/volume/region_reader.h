@@ -8,7 +8,7 @@
 #include "pipeline/volume/array_samples.h"
 #include "pipeline/workers.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Reads boxes of samples, the next one while the caller works on the last one.
 class RegionReader {

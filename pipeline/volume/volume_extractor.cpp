@@ -3,7 +3,7 @@
 #include "core/cancellable_progress.h"
 #include "pipeline/volume/volume_pass.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 struct VolumeExtractor::Impl {
   VolumeSamples samples;

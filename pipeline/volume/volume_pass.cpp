@@ -16,7 +16,7 @@
 #include "pipeline/extract/mesh_header.h"
 #include "pipeline/program_memory.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 constexpr Int3 kOne{1, 1, 1};

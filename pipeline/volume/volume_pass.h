@@ -7,7 +7,7 @@
 #include "pipeline/workers.h"
 #include "surface/cpu_extractor.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// One surface of a volume without a store.
 class VolumePass {

@@ -9,7 +9,7 @@
 #include "index/leaf_ranges.h"
 #include "index/row_ranges.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 constexpr Index kBlocksOfTile = kTileEdge / kBlockEdge;

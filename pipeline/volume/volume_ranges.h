@@ -8,7 +8,7 @@
 #include "core/tile.h"
 #include "pipeline/volume/array_samples.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// The ranges of all blocks of 16³ cells of a volume: two samples for 4096.
 class VolumeRanges {

@@ -7,7 +7,7 @@
 #include <isobrick/store_reader.h>
 #include "tests/io/bytes/temp_dir.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 class ImageVolumesTest : public testing::Test {

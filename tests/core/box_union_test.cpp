@@ -4,7 +4,7 @@
 
 #include <limits>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 struct BoxOfDoubles {

@@ -5,7 +5,7 @@
 #include <filesystem>
 #include <system_error>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 TEST(ErrorMessage, NamesWhatToDoWhereNoThreadStarts) {

@@ -7,7 +7,7 @@
 #include <set>
 #include <utility>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 TEST(FreeList, TakesTheFirstThatIsLargeEnough) {

@@ -8,7 +8,7 @@
 #include "core/copy_box.h"
 #include "core/printable.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 TEST(Lattice, TheBricksOfABoxAreThoseThatHoldItsSamples) {

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 TEST(LengthUnit, SymbolsBecomeNamesAndBack) {

@@ -8,7 +8,7 @@
 
 #include "tests/temporary_folder.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 namespace fs = std::filesystem;

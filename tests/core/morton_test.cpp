@@ -4,7 +4,7 @@
 
 #include <vector>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 TEST(Morton, EncodesAndDecodesAllOf21Bits) {

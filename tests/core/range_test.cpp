@@ -7,7 +7,7 @@
 
 #include <isobrick/lattice.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 TEST(ValueRange, LeavesNaNOutAndKnowsWhenItIsEmpty) {

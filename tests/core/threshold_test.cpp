@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <vector>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 constexpr double kInf = std::numeric_limits<double>::infinity();

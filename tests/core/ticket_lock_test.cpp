@@ -5,7 +5,7 @@
 #include <thread>
 #include <vector>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 TEST(TicketLock, GoesToThreadsInTurn) {

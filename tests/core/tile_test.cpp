@@ -4,7 +4,7 @@
 
 #include <vector>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 // The boxes must hold every sample of the closed active blocks and `reach`

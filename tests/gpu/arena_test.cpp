@@ -5,7 +5,7 @@
 #include <array>
 #include <cstdint>
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 namespace {
 
 TEST(Arena, SlicesFollowEachOtherAligned) {

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <utility>
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 namespace {
 
 TEST(MappedPages, AreWholeAlignedAndWritable) {

@@ -11,7 +11,7 @@
 
 // What stays on a device, which needs no device to tell.
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 const Lattice kLattice{{200, 131, 260}, {64, 64, 64}, ScalarType::u16};

@@ -12,7 +12,7 @@
 
 // Searches and builds on the device give what the definition and the CPU give.
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 template <class T>

@@ -9,7 +9,7 @@
 
 // Sizes of streaming extractions, alone and beside each other, which need no device.
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 constexpr std::uint64_t kMiB = std::uint64_t{1} << 20, kMuch = kMiB << 20;

@@ -6,7 +6,7 @@
 
 // Whatever the structure, the tiles are those of the linear scan, in its order.
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 template <class T>

@@ -6,7 +6,7 @@
 #include "index/span_index.h"
 #include "range_sets.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// Opens bytes that may be anything. Those that pass must answer within bounds;

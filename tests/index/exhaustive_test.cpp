@@ -3,7 +3,7 @@
 #include "index/span_index.h"
 #include "range_sets.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 using u8 = std::uint8_t;

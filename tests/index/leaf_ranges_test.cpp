@@ -8,7 +8,7 @@
 #include "index/span_index.h"
 #include "range_sets.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 template <class T>

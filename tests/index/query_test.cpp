@@ -7,7 +7,7 @@
 #include "index/span_index.h"
 #include "range_sets.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 std::vector<std::uint32_t> sorted(std::vector<std::uint32_t> ids) {

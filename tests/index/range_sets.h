@@ -10,7 +10,7 @@
 #include <isobrick/range.h>
 #include <isobrick/vec.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 template <class T>
 struct RangeSet {

@@ -11,7 +11,7 @@
 // The work of queries, counted, against the theory's bounds, as the number of
 // items grows to 10⁷.
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 constexpr std::size_t kSizes[] = {1'000, 30'000, 1'000'000, 10'000'000};

@@ -6,7 +6,7 @@
 #include "pipeline/convert/downsample.h"
 #include "tests/pipeline/convert_doubles.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 template <class T>

@@ -3,7 +3,7 @@
 #include "pipeline/index/range_scan.h"
 #include "tests/pipeline/convert_doubles.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 using test::brute_range;

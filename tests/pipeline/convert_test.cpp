@@ -10,7 +10,7 @@
 #include "tests/pipeline/least_budget.h"
 #include "tests/pipeline/naive_counts.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 using namespace test;

@@ -14,7 +14,7 @@
 #include "pipeline/program_memory.h"
 #include "tests/pipeline/convert_store.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 using namespace test;

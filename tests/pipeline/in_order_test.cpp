@@ -7,7 +7,7 @@
 #include <memory>
 #include <stdexcept>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// Something that is under way; `value` counts who holds it.

@@ -5,7 +5,7 @@
 #include "bricks/ranges/stored_ranges.h"
 #include "tests/pipeline/convert_store.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 using namespace test;

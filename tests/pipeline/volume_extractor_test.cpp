@@ -13,7 +13,7 @@
 #include "tests/pipeline/convert_store.h"
 #include "tests/surface/field.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 using testing::Field;

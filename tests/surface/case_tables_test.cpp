@@ -7,7 +7,7 @@
 #include <set>
 #include <vector>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 using Segment = std::pair<int, int>;

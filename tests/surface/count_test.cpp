@@ -2,7 +2,7 @@
 
 #include "tests/surface/field.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 using testing::Field;

@@ -10,7 +10,7 @@
 #include "io/meshes/vtp_sink.h"
 #include "tests/io/meshes/test_meshes.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 void write(MeshSink&& sink, const TestMesh& mesh, bool normals, const std::string& unit = "") {

@@ -3,7 +3,7 @@
 #include <isobrick/error.h>
 #include "viewer/app/panels.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 void draw_backend_panel(ViewerState& state) {
   DeviceMeshes& device = state.scene_renderer->device();

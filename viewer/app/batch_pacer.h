@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cstdint>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Chooses the work of a draw batch in software; see Renderer::advance(). The first batch is small.
 /// A batch that exceeds its time limit halves the next ones; one that leaves a quarter of it makes

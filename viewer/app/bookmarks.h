@@ -6,7 +6,7 @@
 
 #include "viewer/app/view_settings.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// A stored view.
 struct Bookmark {

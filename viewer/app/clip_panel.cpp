@@ -7,7 +7,7 @@
 #include "core/vectors.h"
 #include "viewer/app/panels.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 constexpr std::array<const char*, 3> kAxes{"x", "y", "z"};

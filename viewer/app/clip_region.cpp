@@ -8,7 +8,7 @@
 
 #include "core/vectors.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// The range of the coarsest level's nodes: of their own samples, or of all below.

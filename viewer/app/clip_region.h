@@ -13,7 +13,7 @@
 
 // Converts settings and cameras to clip regions, views and picture settings of a volume.
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Completes settings: adds a surface if there is none, chooses an isovalue for surfaces with NaN,
 /// and the volume's range for an empty window. The isovalue is the middle of the coarsest level's

@@ -5,7 +5,7 @@
 #include "core/length_unit.h"
 #include "viewer/app/clip_region.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 constexpr Vec3f kMarkColour{0.85f, 0.1f, 0.1f}, kBoxColour{0.35f, 0.38f, 0.42f};

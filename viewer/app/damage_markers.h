@@ -5,7 +5,7 @@
 #include "viewer/scene/drawable.h"
 #include "viewer/scene/node_grid.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Draws boxes with a cross around damaged nodes of `shown` (null: none). Draws the volume's box,
 /// axes and scale bar if the settings have them. `last`: the last sample of level 0.

@@ -9,7 +9,7 @@
 #include <isobrick/error.h>
 #include "pipeline/extract/gpu_backend.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 void DeviceOpener::begin() {
   if (has_begun()) return;

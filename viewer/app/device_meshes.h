@@ -13,7 +13,7 @@
 #include "viewer/render/imported_buffers.h"
 #include "viewer/scene/scene_stream.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Opens the device that makes meshes, on a thread of its own, and imports its memory into OpenGL.
 /// All memory is allocated and imported before the first mesh, one block at a time, since an import

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <limits>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Keeps frames within a time limit during motion, by previews. A preview that exceeds the limit
 /// makes the next one a step coarser; one that leaves a quarter of the limit makes it a step finer.

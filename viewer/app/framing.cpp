@@ -1,6 +1,6 @@
 #include "viewer/app/framing.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// Sets the camera's depth range to the whole volume, its box and slices.

@@ -3,7 +3,7 @@
 #include "viewer/app/scene_renderer.h"
 #include "viewer/render/camera_request.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Moves the camera and its target so that a box of a store fills a picture of width / height
 /// `aspect` up to a margin. The direction stays.

@@ -4,7 +4,7 @@
 
 #include "viewer/app/panels.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 struct HelpLine {

@@ -12,7 +12,7 @@
 #include "io/volumes/open/volume_format.h"
 #include "pipeline/index/add_ranges.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 namespace fs = std::filesystem;
 

@@ -14,7 +14,7 @@
 #include "core/thread_annotations.h"
 #include "io/volumes/vdb/vdb_header.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Makes a volume ready to view, on a thread of its own: opens it by way of the cache, or adds
 /// ranges to an image. The destructor cancels it and waits for the thread.

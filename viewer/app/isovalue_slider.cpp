@@ -6,7 +6,7 @@
 
 #include "viewer/app/panels.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 constexpr ImU32 kBack = IM_COL32(30, 32, 36, 255), kBar = IM_COL32(130, 140, 155, 255),

@@ -8,7 +8,7 @@
 #include <isobrick/progress.h>
 #include "core/file_error.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 constexpr int kBins = 256;

@@ -11,7 +11,7 @@
 #include "viewer/scene/isovalue_counts.h"
 #include "viewer/scene/scene_stream.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Statistics of a store's isovalues: the histogram of its samples, counted by a thread of its own,
 /// and the size of surfaces, from the ranges.

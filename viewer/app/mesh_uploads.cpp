@@ -4,7 +4,7 @@
 #include <utility>
 #include <vector>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// Bytes of one copy. While a driver is busy, allocating memory for a megabyte takes it some

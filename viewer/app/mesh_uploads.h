@@ -9,7 +9,7 @@
 #include "viewer/render/mesh_pool.h"
 #include "viewer/scene/drawable.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Uploads meshes from host memory to the device, into `pool`, which must outlive this. Unused
 /// meshes stay while there is room: if the scene drops and remakes a mesh, it is already on the

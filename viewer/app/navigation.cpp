@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numbers>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// Angle of a drag across the picture's shorter side.

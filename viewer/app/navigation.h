@@ -4,7 +4,7 @@
 
 #include "viewer/render/camera.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 enum class NavigationMode : std::uint8_t {
   orbit,      ///< around the target; the vertical stays vertical

@@ -20,7 +20,7 @@
 #include "core/stopwatch.h"
 #include "core/vectors.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 constexpr std::array<const char*, 3> kAxes{"x", "y", "z"};

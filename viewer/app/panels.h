@@ -4,7 +4,7 @@
 
 #include "viewer/app/viewer_state.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Height of the font and initial width of the panel, on a display without scaling.
 inline constexpr float kFontPixels = 13, kPanelWidth = 390;

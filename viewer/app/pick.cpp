@@ -8,7 +8,7 @@
 #include "viewer/app/panels.h"
 #include "viewer/scene/probe.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 constexpr ImU32 kInk = IM_COL32(20, 20, 20, 255), kPaper = IM_COL32(255, 230, 90, 255);

@@ -4,7 +4,7 @@
 
 #include "viewer/app/viewer_state.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// The point that the picture shows at a pixel, rows from the top; nullopt on the background.
 std::optional<PickedPoint> pick_point(SceneRenderer& scene_renderer, int x, int y);

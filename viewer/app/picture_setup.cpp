@@ -11,7 +11,7 @@
 #include "pipeline/extract/gpu_backend.h"
 #include "viewer/render/gl_context.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// A size that suffices to compile all shaders.

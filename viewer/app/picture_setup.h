@@ -10,7 +10,7 @@
 #include "viewer/render/mesh_pool.h"
 #include "viewer/render/renderer.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Budgets and options for pictures of a store.
 struct PictureBudgets {

@@ -10,7 +10,7 @@
 #include "core/stopwatch.h"
 #include "viewer/render/gl_context.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 using Clock = std::chrono::steady_clock;

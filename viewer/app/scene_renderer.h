@@ -21,7 +21,7 @@
 #include "viewer/render/renderer.h"
 #include "viewer/scene/scene.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Seconds of a draw batch in software: input is handled in between.
 inline constexpr double kBatchSeconds = 0.045;

@@ -6,7 +6,7 @@
 
 // World-space bounds of a store, and of what is shown of it.
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 WorldBox world_box(const Transform& transform, const IndexBox& box) {

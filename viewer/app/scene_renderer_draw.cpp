@@ -12,7 +12,7 @@
 
 // Draws a chosen frame, in batches; scene_renderer.cpp chooses it.
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 constexpr std::uint64_t kAllWork = std::numeric_limits<std::uint64_t>::max();

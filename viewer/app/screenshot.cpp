@@ -7,7 +7,7 @@
 #include <isobrick/error.h>
 #include "io/bytes/png_file.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 std::vector<Screenshot> turntable(Camera camera, Vec3d vertical, int frames,
                                   const std::string& folder) {

@@ -6,7 +6,7 @@
 
 #include "viewer/app/scene_renderer.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// A picture to draw into a file.
 struct Screenshot {

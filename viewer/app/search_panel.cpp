@@ -5,7 +5,7 @@
 
 #include "viewer/app/panels.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// Names of kIndexKinds, in their order.

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cstring>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// Maximum bytes of one slice's samples. There are as many floats besides, also on the device.

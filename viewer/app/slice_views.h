@@ -12,7 +12,7 @@
 #include "viewer/render/renderer.h"
 #include "viewer/scene/scene_stream.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// The slices of a store in a renderer's format. Not thread-safe.
 class SliceViews {

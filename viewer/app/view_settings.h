@@ -11,7 +11,7 @@
 #include "viewer/render/camera.h"
 #include "viewer/render/renderer.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// One isosurface.
 struct SurfaceSettings {

@@ -18,7 +18,7 @@
 #include "viewer/app/scene_renderer.h"
 #include "viewer/app/view_settings.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// A picked point.
 struct PickedPoint {

@@ -25,7 +25,7 @@
 #include "viewer/app/window_events.h"
 #include "viewer/render/font_atlas.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 std::string glfw_message(const char* what) {

@@ -13,7 +13,7 @@
 
 struct GLFWwindow;
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Options of a window.
 struct WindowOptions {

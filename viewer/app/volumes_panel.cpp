@@ -6,7 +6,7 @@
 #include "core/printable.h"
 #include "viewer/app/panels.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 constexpr std::size_t kMaxNameLength = 60;  ///< characters of a channel's name

@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// Pixels between press and release, above which they are a drag and not a click.

@@ -4,7 +4,7 @@
 
 #include "viewer/app/viewer_window.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Applies mouse, keys and dropped files to a window.
 class ViewerWindow::Events {

@@ -19,7 +19,7 @@
 
 // The loop of a window: wait for events, draw, show.
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// Maximum step of motions; a longer frame is a pause.

@@ -18,7 +18,7 @@
 
 // The volume of a window: opened, dropped, converted, chosen from an image.
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// Whether the shown volume of a Zarr lacks ranges.

@@ -6,7 +6,7 @@
 
 #include "core/vectors.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 WorldBall ball_around(Vec3d lo, Vec3d hi) {
   const Vec3d half = (hi - lo) * 0.5;

@@ -6,7 +6,7 @@
 
 #include <isobrick/vec.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// A ball in world space.
 struct WorldBall {

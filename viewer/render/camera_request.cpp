@@ -11,7 +11,7 @@
 #include <isobrick/error.h>
 #include "core/vectors.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 constexpr const char* kForm =

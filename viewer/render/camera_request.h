@@ -6,7 +6,7 @@
 #include <isobrick/vec.h>
 #include "viewer/render/camera.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// A requested camera, before the scene is known.
 struct CameraRequest {

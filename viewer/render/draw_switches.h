@@ -7,7 +7,7 @@
 
 #include "viewer/render/frame.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Sets the context's state for drawing; restores OpenGL's defaults.
 class DrawSwitches {

@@ -22,7 +22,7 @@ __asm__(
     ".byte 0\n"
     ".popsection\n");
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 extern const char kFontBegin[] __asm__("isobrick_font_begin") __attribute__((visibility("hidden")));
 extern const char kFontEnd[] __asm__("isobrick_font_end") __attribute__((visibility("hidden")));

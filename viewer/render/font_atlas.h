@@ -5,7 +5,7 @@
 #include <string_view>
 #include <vector>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// The embedded font (DejaVu Sans, TrueType).
 std::string_view font_bytes();

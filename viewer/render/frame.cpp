@@ -8,7 +8,7 @@
 
 #include "core/vectors.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 float to_linear(float v) {

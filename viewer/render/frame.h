@@ -9,7 +9,7 @@
 #include "viewer/render/gl_objects.h"
 #include "viewer/render/renderer.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Maximum number of clip planes and faces of the clip box together.
 inline constexpr int kMaxHalfSpaces = 12;

@@ -13,7 +13,7 @@
 
 #include <isobrick/error.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 bool has_word(const char* list, std::string_view word) {

@@ -3,7 +3,7 @@
 #include <memory>
 #include <string>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// An OpenGL 4.5 core context without a window or a display, made with EGL: on the first hardware
 /// device that supports it, else by Mesa in software. It is current in the thread that made it

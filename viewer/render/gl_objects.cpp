@@ -9,7 +9,7 @@
 
 #include <isobrick/error.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 const char* name_of(unsigned error) {

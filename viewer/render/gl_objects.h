@@ -6,7 +6,7 @@
 #include <string_view>
 #include <utility>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 // Owners of OpenGL objects. Make and destroy them in a current context. Moved-from owners hold 0,
 // which OpenGL ignores.

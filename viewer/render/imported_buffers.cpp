@@ -9,7 +9,7 @@
 
 #include <isobrick/error.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 static_assert(GL_UUID_SIZE_EXT == 16);
 

@@ -7,7 +7,7 @@
 #include "viewer/render/gl_objects.h"
 #include "viewer/render/mesh_pool.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// The UUID of the current context's device, which CUDA reports too; nullopt if OpenGL cannot
 /// import memory.

@@ -13,7 +13,7 @@
 #include "viewer/render/frame.h"
 #include "viewer/render/gl_context.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// Parameters of one mesh; std430.

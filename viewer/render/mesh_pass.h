@@ -11,7 +11,7 @@
 #include "viewer/render/mesh_queue.h"
 #include "viewer/render/renderer.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Draws meshes into the bound framebuffer, opaque or with weights for blending.
 class MeshPass {

@@ -12,7 +12,7 @@
 #include "io/bytes/mapped_file.h"
 #include "viewer/render/gl_context.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 struct OpenMesh {

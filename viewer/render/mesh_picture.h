@@ -8,7 +8,7 @@
 #include "viewer/render/camera_request.h"
 #include "viewer/render/renderer.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 struct MeshInput {
   std::string path;

@@ -12,7 +12,7 @@
 #include <isobrick/error.h>
 #include "core/mesh_free_list.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 static_assert(sizeof(Vec3f) == 12 && sizeof(Triangle) == 12);

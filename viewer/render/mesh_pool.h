@@ -10,7 +10,7 @@
 #include <isobrick/vec.h>
 #include "viewer/render/gl_objects.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 struct MeshBlock;
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 void MeshQueue::add(const PooledMesh& mesh, const MeshStyle& style) {
   draws_.push_back({&mesh, style, 0, mesh.place().triangle_count});

@@ -8,7 +8,7 @@
 #include "viewer/render/mesh_pool.h"
 #include "viewer/render/renderer.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Triangles of a mesh and their style.
 struct MeshDraw {

@@ -11,7 +11,7 @@
 #include "core/vectors.h"
 #include "viewer/render/frame.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 constexpr float kFontHeight = 40;

@@ -12,7 +12,7 @@
 #include "viewer/render/picture_targets.h"
 #include "viewer/render/renderer.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Overlays of a picture.
 struct Overlays {

@@ -5,7 +5,7 @@
 #include <array>
 #include <vector>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 PictureResult::PictureResult(int picture_width, int picture_height, bool with_ids)
     : width(picture_width), height(picture_height), ids(with_ids) {

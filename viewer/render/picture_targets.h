@@ -5,7 +5,7 @@
 
 #include "viewer/render/gl_objects.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// A picture, with the textures that picking and overlays read later.
 struct PictureResult {

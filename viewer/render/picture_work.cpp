@@ -4,7 +4,7 @@
 #include <array>
 #include <limits>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// Minimum rows of a call: a software driver works on tiles of this size.

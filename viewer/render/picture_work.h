@@ -11,7 +11,7 @@
 #include "viewer/render/screen_pass.h"
 #include "viewer/render/slice_pass.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// The passes that draw a picture.
 struct PicturePasses {

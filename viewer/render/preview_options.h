@@ -3,7 +3,7 @@
 #include <isobrick/vec.h>
 #include "viewer/render/camera_request.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Limits of a picture's width and height, in pixels.
 inline constexpr int kMinPictureEdge = 16, kMaxPictureEdge = 16384;

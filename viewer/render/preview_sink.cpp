@@ -10,7 +10,7 @@
 #include "io/bytes/png_file.h"
 #include "viewer/render/camera_request.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 constexpr std::size_t kBatch = std::size_t{1} << 17;  ///< triangles that one call draws

@@ -14,7 +14,7 @@
 #include "viewer/render/preview_options.h"
 #include "viewer/render/renderer.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Draws the mesh into a PNG picture, off-screen, framed to fill it. A mesh of one batch of
 /// triangles is framed by its own bounds, a larger one by those of its active blocks. The division

@@ -12,7 +12,7 @@
 #include "viewer/render/camera.h"
 #include "viewer/render/mesh_pool.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// An axis-aligned box in world space.
 struct WorldBox {

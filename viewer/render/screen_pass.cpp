@@ -7,7 +7,7 @@
 
 #include "viewer/render/frame.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 const char* const kVertex = R"(

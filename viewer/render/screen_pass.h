@@ -7,7 +7,7 @@
 #include "viewer/render/picture_targets.h"
 #include "viewer/render/renderer.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Input and output of the screen steps.
 struct ScreenPicture {

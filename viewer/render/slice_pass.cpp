@@ -10,7 +10,7 @@
 #include "core/vectors.h"
 #include "viewer/render/frame.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 const char* const kVertex = R"(

@@ -6,7 +6,7 @@
 #include "viewer/render/gl_objects.h"
 #include "viewer/render/renderer.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Draws slices into the bound framebuffer.
 class SlicePass {

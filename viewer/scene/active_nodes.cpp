@@ -4,7 +4,7 @@
 #include <bit>
 #include <utility>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 ActiveNodes::ActiveNodes(const NodeTree& tree) : tree_(tree), above_(tree.grid(), 0) {
   const auto nodes = static_cast<std::uint64_t>(volume(tree.grid().level(0).nodes));

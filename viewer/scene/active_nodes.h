@@ -7,7 +7,7 @@
 #include "viewer/scene/node_flags.h"
 #include "viewer/scene/node_tree.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// The active nodes of a few isovalues: one bit for each node of the finest level, one byte for
 /// each node of the other levels. Reading is thread-safe.

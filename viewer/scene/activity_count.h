@@ -4,7 +4,7 @@
 
 #include "core/thread_annotations.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Counts running activities, so that an owner which closes can wait for their end. Thread-safe.
 class ActivityCount {

@@ -14,7 +14,7 @@
 #include "gpu/grid/mesh_memory.h"
 #include "viewer/scene/device_mesher.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// Slots for grids in flight: threads fill one half while the device works on the other.

@@ -7,7 +7,7 @@
 #include "core/thread_annotations.h"
 #include "viewer/scene/device_mesher.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// The device that makes a stream's meshes, until the device fails. Thread-safe.
 class CurrentDevice {

@@ -5,7 +5,7 @@
 #include <queue>
 #include <tuple>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// Factor on the cell length of nodes that were refined in the previous cut.

@@ -9,7 +9,7 @@
 #include "viewer/scene/node_tree.h"
 #include "viewer/scene/view.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Limits of an LOD cut. They are compared with estimates: a node's triangles are its active blocks
 /// times `triangles_per_block`, and 0 where the node is clipped.

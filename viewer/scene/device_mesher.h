@@ -15,7 +15,7 @@
 // Node meshes made by a device, in memory that OpenGL can draw from. cuda_mesher.cpp implements it
 // where the CUDA backend is built, else no_cuda_mesher.cpp.
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// A block of device memory that many meshes share: an array of positions, one of as many normals,
 /// one of triangles, in this order. OpenGL imports it by its file descriptor.

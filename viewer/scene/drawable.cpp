@@ -1,6 +1,6 @@
 #include "viewer/scene/drawable.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 class CoverBuilder {

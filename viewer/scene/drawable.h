@@ -8,7 +8,7 @@
 #include "viewer/scene/cut.h"
 #include "viewer/scene/mesh_cache.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 struct NodeDraw {
   MeshPtr mesh;

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// Number of values between which block counts are interpolated.

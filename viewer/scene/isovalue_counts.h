@@ -6,7 +6,7 @@
 
 #include "stream/brick_source.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Counts how much of a level an isovalue stabs, in O(log n) a query.
 class IsovalueCounts {

@@ -5,7 +5,7 @@
 
 #include "core/thread_annotations.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Decides when a plan skips the levels between the coarsest one and the cut's. That is where most
 /// of a cut is new and all of it can be made soon: the intermediate meshes would be replaced at

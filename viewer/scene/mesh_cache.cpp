@@ -4,7 +4,7 @@
 #include <limits>
 #include <utility>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 std::vector<MeshCache::Entry>* MeshCache::entries_of(const NodeKey& key, double isovalue) {
   const auto surface = surfaces_.find(isovalue);

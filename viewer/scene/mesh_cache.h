@@ -9,7 +9,7 @@
 
 #include "viewer/scene/node_mesh.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 using MeshPtr = std::shared_ptr<const NodeMesh>;
 

@@ -5,7 +5,7 @@
 #include "core/thread_annotations.h"
 #include "viewer/scene/node_mesh.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Totals of the meshes that were made. Thread-safe.
 class MeshStatistics {

@@ -2,7 +2,7 @@
 
 #include "viewer/scene/node_grid.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// Samples before and after a block's first sample that its cells or their gradients need.

@@ -6,7 +6,7 @@
 
 #include <isobrick/store_reader.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Which samples a node of the finest level needs, by the ranges of its blocks of 16³ cells. Where
 /// all samples of a block lie on one side of the isovalue, only the side is needed.

@@ -4,7 +4,7 @@
 
 #include "surface/lod_seam.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// The axes along a face.

@@ -8,7 +8,7 @@
 #include "surface/grid_view.h"
 #include "viewer/scene/node_samples.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// The values on a node's border to coarser neighbours.
 class NodeBorder {

@@ -6,7 +6,7 @@
 
 #include "viewer/scene/node_grid.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// A byte for each node above the finest level. Each level has a border one node wide, so that code
 /// can read neighbours without a bounds check.

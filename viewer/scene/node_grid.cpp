@@ -5,7 +5,7 @@
 
 #include <isobrick/error.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// Components along the volume's own axes.

@@ -9,7 +9,7 @@
 #include <isobrick/store_reader.h>
 #include "core/flat_map.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Edge of a node in cells of its level.
 inline constexpr Index kNodeEdge = 64;

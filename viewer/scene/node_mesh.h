@@ -8,7 +8,7 @@
 #include <isobrick/surface_options.h>
 #include "viewer/scene/node_grid.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Identifies a node's mesh: meshes with one id have the same bytes.
 struct MeshId {

@@ -11,7 +11,7 @@
 #include "surface/world_map.h"
 #include "viewer/scene/node_border.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 using Clock = std::chrono::steady_clock;

@@ -9,7 +9,7 @@
 #include "viewer/scene/node_mesh.h"
 #include "viewer/scene/node_samples.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// A brick of a stored level.
 struct StoredBrick {

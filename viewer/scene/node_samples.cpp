@@ -8,7 +8,7 @@
 #include "core/copy_box.h"
 #include "surface/grid_view.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// Interpolates between a and b. At an end it returns that end, even if the other is infinite or

@@ -9,7 +9,7 @@
 #include "viewer/scene/needed_samples.h"
 #include "viewer/scene/node_grid.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Values at the grid points of a box, C order [z, y, x].
 struct GridValues {

@@ -8,7 +8,7 @@
 #include "core/stopwatch.h"
 #include "index/span_index.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// Bytes for the headers of two indices and for the padding of their arrays.

@@ -16,7 +16,7 @@
 #include "viewer/scene/active_nodes.h"
 #include "viewer/scene/node_tree.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Formats a number of bytes: "1.5 KiB", "3.0 MiB".
 std::string size_text(std::uint64_t bytes);

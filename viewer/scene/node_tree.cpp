@@ -7,7 +7,7 @@
 #include <limits>
 #include <utility>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// Nodes along each axis whose ranges are read together: at level 0 one stored chunk of block

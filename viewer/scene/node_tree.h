@@ -12,7 +12,7 @@
 #include "viewer/scene/node_grid.h"
 #include "viewer/scene/thin_structure.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// The nodes of all levels with their ranges; about 56 bytes for each 64³ cells. Immutable but for
 /// thin_structure(), and thread-safe.

@@ -5,7 +5,7 @@
 #include <cstring>
 #include <memory>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// Components along the volume's axes, in samples of a level.

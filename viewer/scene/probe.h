@@ -5,7 +5,7 @@
 #include "stream/resident_bricks.h"
 #include "viewer/scene/node_grid.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// The value of the field at a point.
 struct FieldValue {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 bool RequestQueue::has_work() const { return (!meshes_.empty() && !paused_) || !slices_.empty(); }
 

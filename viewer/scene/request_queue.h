@@ -10,7 +10,7 @@
 #include "core/thread_annotations.h"
 #include "viewer/scene/stream_request.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Requests for meshes and slices, by priority: those that wait, and those that threads are
 /// running. Slices come before meshes. Thread-safe.

@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <utility>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// Old meshes free one in so many bytes of a full device's budget.

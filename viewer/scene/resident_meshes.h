@@ -9,7 +9,7 @@
 #include "viewer/scene/drawable.h"
 #include "viewer/scene/stream_plan.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// The resident node meshes, within their budgets, and the part of them that shows an LOD cut. Not
 /// thread-safe.

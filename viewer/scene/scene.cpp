@@ -6,7 +6,7 @@
 
 #include "core/stopwatch.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// Whether both cuts request the same meshes; sizes and distances may differ.

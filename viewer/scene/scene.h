@@ -7,7 +7,7 @@
 #include "viewer/scene/node_search.h"
 #include "viewer/scene/scene_stream.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Seconds for each step of the last LOD cut.
 struct CutTimes {

@@ -8,7 +8,7 @@
 #include "viewer/scene/stream_state.h"
 #include "viewer/scene/stream_worker.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// How long the destructor waits for blocked threads and for a device.

@@ -14,7 +14,7 @@
 #include "viewer/scene/drawable.h"
 #include "viewer/scene/slice_image.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 struct StreamState;
 

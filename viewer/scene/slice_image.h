@@ -8,7 +8,7 @@
 #include "stream/resident_bricks.h"
 #include "viewer/scene/node_grid.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// A request for a plane of samples.
 struct SliceRequest {

@@ -2,7 +2,7 @@
 
 #include <utility>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 void SliceSlots::set(int slot, const std::optional<SliceRequest>& slice) {
   const MutexLock lock(mutex_);

@@ -7,7 +7,7 @@
 #include "core/thread_annotations.h"
 #include "viewer/scene/request_queue.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// The requested slices, each in a numbered slot, and the last finished image of each. Thread-safe.
 class SliceSlots {

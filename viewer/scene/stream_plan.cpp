@@ -4,7 +4,7 @@
 #include <tuple>
 #include <unordered_map>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 bool more_urgent(const MeshJob& a, const MeshJob& b) {

@@ -6,7 +6,7 @@
 #include "viewer/scene/drawable.h"
 #include "viewer/scene/node_mesher.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// A mesh to make.
 struct MeshJob {

@@ -7,7 +7,7 @@
 #include "viewer/scene/slice_image.h"
 #include "viewer/scene/stream_plan.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// A request for a mesh, or for the slice of a slot. It is also the cancellation token that the
 /// thread checks. Thread-safe.

@@ -4,7 +4,7 @@
 #include <thread>
 #include <utility>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 int thread_count(int requested) {

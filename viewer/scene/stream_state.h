@@ -12,7 +12,7 @@
 #include "viewer/scene/scene_stream.h"
 #include "viewer/scene/slice_slots.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// The state that a stream shares with its threads. All parts but `meshes` have locks of their own.
 /// It outlives the stream while a thread is blocked in a read, or a device makes a mesh; then the

@@ -7,7 +7,7 @@
 #include <isobrick/error.h>
 #include "core/stopwatch.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 NodeMesh empty_mesh(const MeshJob& job) {

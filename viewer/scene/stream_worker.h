@@ -5,7 +5,7 @@
 
 #include "viewer/scene/stream_state.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Makes the meshes and slices of a stream's queue. One for each worker thread.
 class StreamWorker {

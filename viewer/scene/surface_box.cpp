@@ -9,7 +9,7 @@
 #include <isobrick/lattice.h>
 #include "core/box_union.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// Blocks along an edge of a node; nodes along an edge of a range chunk.

@@ -6,7 +6,7 @@
 #include "stream/brick_source.h"
 #include "viewer/scene/node_tree.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// The bounding box, in level-0 index space, of the surfaces of level 0 within `part`; nullopt if
 /// there are none. `tree`: of the same source.

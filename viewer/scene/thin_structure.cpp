@@ -7,7 +7,7 @@
 
 #include "viewer/scene/node_samples.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// Maximum samples of a stored level that is read: 128³.

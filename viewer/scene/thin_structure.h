@@ -9,7 +9,7 @@
 #include "stream/resident_bricks.h"
 #include "viewer/scene/node_grid.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 class NodeSamples;
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// Scale of the picture in which refined nodes stay refined.

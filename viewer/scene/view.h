@@ -8,7 +8,7 @@
 #include "core/half_space.h"
 #include "viewer/scene/node_grid.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// A view of a scene.
 struct View {

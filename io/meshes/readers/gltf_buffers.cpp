@@ -12,7 +12,7 @@
 #include "io/meshes/readers/memory_stream.h"
 #include "io/meshes/readers/scratch_rows.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// "a%20b" → "a b".

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 [[noreturn]] void fail_gltf(const std::string& path, const std::string& what);
 

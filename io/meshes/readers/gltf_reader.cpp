@@ -16,7 +16,7 @@
 #include "io/meshes/readers/mesh_parts_reader.h"
 #include "io/meshes/readers/mesh_readers.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 using nlohmann::json;

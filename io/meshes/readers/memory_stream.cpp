@@ -7,7 +7,7 @@
 
 #include "io/bytes/mapped_file.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 class MemoryStream final : public ByteStream {

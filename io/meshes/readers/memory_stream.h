@@ -7,7 +7,7 @@
 
 #include "io/bytes/byte_stream.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Bytes in memory, which must live as long; `path` is for messages.
 std::unique_ptr<ByteStream> make_memory_stream(const std::string& path,

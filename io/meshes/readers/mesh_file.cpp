@@ -11,7 +11,7 @@
 #include "io/meshes/mesh_name.h"
 #include "io/meshes/readers/mesh_readers.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 #ifndef ISOBRICK_WITH_EXPAT
 std::unique_ptr<MeshFile> read_vtp(const std::string& path, std::shared_ptr<MappedFile>) {

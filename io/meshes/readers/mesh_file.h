@@ -8,7 +8,7 @@
 #include <isobrick/mesh.h>
 #include <isobrick/vec.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// The description of a mesh file.
 struct MeshFileInfo {

@@ -14,7 +14,7 @@
 #include "io/bytes/byte_order.h"
 #include "io/bytes/mapped_file.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 template <class T>

@@ -13,7 +13,7 @@
 #include <isobrick/vec.h>
 #include "io/meshes/readers/mesh_file.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// How a number lies in a file.
 enum class NumberKind : std::uint8_t { i8, u8, i16, u16, i32, u32, i64, u64, f32, f64 };

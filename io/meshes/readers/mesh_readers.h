@@ -6,7 +6,7 @@
 #include "io/bytes/mapped_file.h"
 #include "io/meshes/readers/mesh_file.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 // One a format; `path` is for messages. Each throws Error for a file that is damaged
 // or has what is not read.

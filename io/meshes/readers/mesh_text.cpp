@@ -8,7 +8,7 @@
 #include <isobrick/error.h>
 #include "io/bytes/mapped_file.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 constexpr std::size_t kMaxLine = 1 << 16;

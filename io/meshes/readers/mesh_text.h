@@ -7,7 +7,7 @@
 
 #include <isobrick/vec.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// The words of a mesh file of text, which is mapped and must live as long: line by line, or one
 /// after the other wherever lines end. Errors name the file and the line.

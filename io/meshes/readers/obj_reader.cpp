@@ -12,7 +12,7 @@
 #include "io/meshes/readers/mesh_text.h"
 #include "io/meshes/readers/scratch_rows.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// Faces of the text; polygons become fans.

@@ -11,7 +11,7 @@
 #include "io/bytes/mapped_file.h"
 #include "io/meshes/readers/mesh_parts_reader.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// A property of a PLY file's elements.
 struct PlyProperty {

@@ -11,7 +11,7 @@
 #include "io/meshes/readers/mesh_readers.h"
 #include "io/meshes/readers/ply_header.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// The field of three properties of an element without lists.

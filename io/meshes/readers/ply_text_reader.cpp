@@ -12,7 +12,7 @@
 #include "io/meshes/readers/ply_header.h"
 #include "io/meshes/readers/scratch_rows.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// Reads the elements of a PLY file one after the other.

@@ -4,7 +4,7 @@
 
 #include "io/bytes/leftovers.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 ScratchBytes::ScratchBytes()
     : out_(open_scratch_beside((temporary_folder() / "isobrick").string())) {}

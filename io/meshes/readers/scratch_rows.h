@@ -9,7 +9,7 @@
 #include "io/bytes/output_file.h"
 #include "io/meshes/readers/mesh_parts_reader.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Bytes in a nameless file of the folder for temporary files, to be mapped once they are all
 /// there: what a mesh file holds only in text or packed.

@@ -9,7 +9,7 @@
 #include "io/meshes/readers/mesh_parts_reader.h"
 #include "io/meshes/readers/mesh_readers.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 constexpr std::size_t kStart = 84, kFacet = 50, kNormal = 12;

@@ -11,7 +11,7 @@
 #include "io/meshes/readers/mesh_readers.h"
 #include "io/meshes/readers/mesh_text.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 using Corners = std::array<Vec3d, 3>;

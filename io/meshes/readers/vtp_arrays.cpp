@@ -10,7 +10,7 @@
 #include "io/meshes/readers/scratch_rows.h"
 #include "io/vtk/vtk_arrays.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// A kind of numbers by VTK's name, and the type that their text becomes: doubles hold the whole

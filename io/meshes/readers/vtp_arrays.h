@@ -11,7 +11,7 @@
 #include "io/vtk/vtk_arrays.h"
 #include "io/vtk/vtk_file.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Numbers side by side in mapped memory.
 struct NumberArray {

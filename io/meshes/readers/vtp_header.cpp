@@ -9,7 +9,7 @@
 #include "io/meshes/readers/memory_stream.h"
 #include "io/vtk/vtk_xml.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 constexpr std::size_t kMaxArrays = 10'000, kMaxParts = 1'000'000;

@@ -9,7 +9,7 @@
 
 #include "io/vtk/vtk_file.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Points and the polygons between them.
 struct VtpPiece {

@@ -14,7 +14,7 @@
 #include "io/meshes/readers/vtp_arrays.h"
 #include "io/meshes/readers/vtp_header.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// Polygons by the ends of their runs of corners; they become fans.

@@ -21,7 +21,7 @@
 #include <isobrick/error.h>
 #include "core/printable.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// Longer elements stay in the file until they are needed.

@@ -9,7 +9,7 @@
 #include <isobrick/vec.h>
 #include "io/volumes/scaled_source.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// The image of a DICOM file.
 struct DicomSlice {

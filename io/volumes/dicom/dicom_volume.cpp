@@ -14,7 +14,7 @@
 #include "io/volumes/dicom/dicom_slice.h"
 #include "io/volumes/raw/text_header.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 double length(Vec3d a) { return std::sqrt(dot(a, a)); }

@@ -6,7 +6,7 @@
 
 #include <isobrick/volume_request.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Opens the files of a DICOM series as the planes of a volume, sorted by where
 /// they lie; or the frames of one file. `name` is what they are called together.

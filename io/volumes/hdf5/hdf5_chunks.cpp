@@ -11,7 +11,7 @@
 #include <isobrick/error.h>
 #include "io/bytes/byte_order.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// Memory for chunks on their way, and for those that are kept.

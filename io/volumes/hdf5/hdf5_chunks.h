@@ -15,7 +15,7 @@
 #include <isobrick/vec.h>
 #include "io/volumes/hdf5/hdf5_filters.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// A chunked array and how its chunks are encoded. Axes are in the order fastest first.
 struct Hdf5ChunkLayout {

@@ -15,7 +15,7 @@
 #include "io/volumes/hdf5/hdf5_library.h"
 #include "io/volumes/hdf5/hdf5_lzf.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// Whether the innermost failure is that a chunk was never written: of the function

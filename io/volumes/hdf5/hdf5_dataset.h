@@ -7,7 +7,7 @@
 #include <isobrick/array_view.h>
 #include <isobrick/scalar.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// An open dataset of an HDF5 file. The library is not made for threads: all
 /// calls of all datasets take turns. Chunks whose filters are deflate, shuffle and

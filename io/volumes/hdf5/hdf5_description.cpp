@@ -11,7 +11,7 @@
 #include "io/volumes/hdf5/hdf5_lzf.h"
 #include "io/volumes/raw/text_header.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// Names of datasets with three or more dimensions.

@@ -11,7 +11,7 @@
 #include "io/volumes/hdf5/hdf5_filters.h"
 #include "io/volumes/hdf5/hdf5_library.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 // The datasets of an HDF5 file. The caller holds hdf5_mutex().
 

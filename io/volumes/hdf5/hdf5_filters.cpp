@@ -10,7 +10,7 @@
 #include "io/bytes/inflate.h"
 #include "io/volumes/hdf5/hdf5_lzf.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 constexpr std::size_t kChecksumBytes = 4;

@@ -6,7 +6,7 @@
 
 #include <isobrick/pod_buffer.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// The filters of HDF5 that are undone here, without libhdf5 and on any thread.
 enum class Hdf5Filter : std::uint8_t { deflate, lzf, shuffle, fletcher32 };

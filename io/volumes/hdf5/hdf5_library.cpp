@@ -5,7 +5,7 @@
 #include <isobrick/error.h>
 #include "core/printable.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 std::mutex& hdf5_mutex() {
   static std::mutex mutex;

@@ -9,7 +9,7 @@
 #include <string>
 #include <utility>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// To be held while any function of the library is called, closing included.
 std::mutex& hdf5_mutex();

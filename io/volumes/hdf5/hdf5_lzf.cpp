@@ -9,7 +9,7 @@
 #include <isobrick/error.h>
 #include "io/volumes/hdf5/hdf5_filters.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// A smaller control byte n is followed by n + 1 literals.

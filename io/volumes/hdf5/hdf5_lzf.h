@@ -5,7 +5,7 @@
 
 #include <isobrick/pod_buffer.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// The number that h5py registered for its filter "lzf".
 inline constexpr int kHdf5LzfFilter = 32000;

@@ -12,7 +12,7 @@
 #include <isobrick/pod_buffer.h>
 #include "io/volumes/hdf5/hdf5_dataset.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// Bytes of samples that are read in the file's order before they are turned, unless one layer has

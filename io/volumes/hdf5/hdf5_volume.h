@@ -5,7 +5,7 @@
 
 #include <isobrick/volume_request.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Opens a dataset of an HDF5 file; `dataset` empty: the only one that can be a
 /// volume.

@@ -9,7 +9,7 @@
 #include "io/volumes/vdb/vdb_level_set.h"
 #include "io/volumes/vdb/vdb_writer.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 // Libraries of formats that take longer to link than most commands take are known
 // only to modules, shared objects that are loaded when they are first needed. Each

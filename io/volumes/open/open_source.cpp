@@ -13,7 +13,7 @@
 #include "io/volumes/selected_source.h"
 #include "io/volumes/vtk/legacy_vtk.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// The header replaces the options of raw samples, but for a byte order that it may lack.

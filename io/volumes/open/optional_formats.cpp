@@ -13,7 +13,7 @@
 #include "io/volumes/tiff/tiff_volume.h"
 #endif
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 [[noreturn, maybe_unused]] void built_without(const std::string& name, const char* format,

@@ -6,7 +6,7 @@
 
 #include <isobrick/volume_request.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 // Formats that are read by a library which may have been missing when this was
 // built; then each throws a UsageError about it. `name` is for messages.

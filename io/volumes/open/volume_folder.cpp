@@ -13,7 +13,7 @@
 #include "io/volumes/open/optional_formats.h"
 #include "io/volumes/open/volume_format.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 namespace fs = std::filesystem;

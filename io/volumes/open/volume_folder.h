@@ -5,7 +5,7 @@
 
 #include <isobrick/volume_request.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Opens a folder that holds a stack of TIFF files, in the order of their names
 /// (numbers in them count as numbers), or a DICOM series. Throws UsageError when

@@ -15,7 +15,7 @@
 #include "io/volumes/raw/nifti_header.h"
 #include "io/volumes/raw/text_header.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 constexpr std::size_t kHeadBytes = 4096;

@@ -4,7 +4,7 @@
 #include <string>
 #include <string_view>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 enum class VolumeFormat : std::uint8_t {
   raw,  ///< and whatever is not recognised

@@ -9,7 +9,7 @@
 #include "core/length_unit.h"
 #include "core/printable.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// `Key = Value` lines by key in lower case, up to ElementDataFile, which ends

@@ -4,7 +4,7 @@
 
 #include "io/volumes/raw/text_header.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Parses a MetaImage header (`.mhd`, or the beginning of a `.mha`) and selects
 /// one volume where there are several.

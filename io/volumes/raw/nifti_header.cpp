@@ -14,7 +14,7 @@
 #include "io/bytes/byte_order.h"
 #include "io/volumes/raw/text_header.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 constexpr std::uint32_t kBytes1 = 348, kBytes2 = 540;

@@ -9,7 +9,7 @@
 #include <isobrick/transform.h>
 #include "io/volumes/scaled_source.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// The header of a NIfTI file.
 struct NiftiHeader {

@@ -5,7 +5,7 @@
 
 #include <isobrick/volume_request.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Opens a NIfTI-1 or NIfTI-2 volume: `.nii`, or `.hdr` with the `.img` beside it,
 /// each also compressed as a whole (`.nii.gz`).

@@ -14,7 +14,7 @@
 #include "core/length_unit.h"
 #include "core/printable.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 std::optional<ScalarType> parse_type(const std::string& name) {

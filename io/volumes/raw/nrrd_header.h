@@ -4,7 +4,7 @@
 
 #include "io/volumes/raw/text_header.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Keys by which nrrd_header_text() keeps what a NRRD has no fields for.
 inline constexpr const char* kNrrdGridClass = "isobrick grid class";

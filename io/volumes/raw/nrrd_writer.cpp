@@ -6,7 +6,7 @@
 #include "core/printable.h"
 #include "io/volumes/raw/nrrd_header.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 std::string vector_text(Vec3d v) { return fmt::format("({},{},{})", v.x, v.y, v.z); }

@@ -4,7 +4,7 @@
 
 #include <isobrick/volume_source.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// The header of a NRRD file, up to and with the empty line that the samples
 /// follow: raw, little endian, x fastest. Numbers are the shortest decimals that

@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 std::vector<std::string> words_of(std::string_view stem) {

@@ -6,7 +6,7 @@
 #include <isobrick/scalar.h>
 #include <isobrick/vec.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// The description of samples in a file's name.
 struct RawName {

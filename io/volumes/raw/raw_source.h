@@ -5,7 +5,7 @@
 #include "io/bytes/file.h"
 #include "io/volumes/sample_layout.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Reads boxes of a file in any order, from any number of threads. The caller
 /// has checked that the file is long enough.

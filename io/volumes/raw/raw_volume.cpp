@@ -21,7 +21,7 @@
 #include "io/volumes/raw/raw_source.h"
 #include "io/volumes/stream_source.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 namespace fs = std::filesystem;

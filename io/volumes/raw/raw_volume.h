@@ -6,7 +6,7 @@
 #include <isobrick/volume_request.h>
 #include "io/volumes/raw/text_header.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Opens a file of raw samples, described by the caller, by a header that lies
 /// beside it (`x.nhdr`, `x.mhd`) or by its name.

@@ -12,7 +12,7 @@
 #include "core/printable.h"
 #include "io/bytes/file.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// As much of a header as a message should show.

@@ -13,7 +13,7 @@
 #include <isobrick/volume_request.h>
 #include "io/bytes/file.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 enum class Encoding : std::uint8_t { raw, gzip, zlib, text };
 

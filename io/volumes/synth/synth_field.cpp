@@ -6,7 +6,7 @@
 
 #include "io/volumes/synth/synth_math.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// f(i) for i in [lo, hi), computed in double.

@@ -4,7 +4,7 @@
 
 #include <isobrick/synth_source.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// A field in about [−1, 1] over one box, row by row; what is shared by rows
 /// was computed once. `Real` is float or double.

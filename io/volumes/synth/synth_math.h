@@ -3,7 +3,7 @@
 #include <cmath>
 #include <cstdint>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 // Exact operations only (IEEE + − × ÷ √, floor, integers): the C library's sine
 // differs from machine to machine. The build forbids contraction into fma.

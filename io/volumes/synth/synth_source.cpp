@@ -13,7 +13,7 @@
 #include <isobrick/lattice.h>
 #include "io/volumes/synth/synth_field.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 constexpr std::string_view kNames[] = {"sphere", "gyroid", "marschner-lobb", "mixing"};

@@ -9,7 +9,7 @@
 #include "core/printable.h"
 #include "io/volumes/raw/text_header.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 Index read_count(const std::string& path, const char* name, std::string_view text) {

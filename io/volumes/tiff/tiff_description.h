@@ -4,7 +4,7 @@
 
 #include <isobrick/vec.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// The description of all pages that ImageJ or OME write into the first page.
 struct TiffDescription {

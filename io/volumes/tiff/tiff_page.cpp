@@ -11,7 +11,7 @@
 #include <isobrick/error.h>
 #include "core/printable.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// No strip, tile or table of a page may take more.

@@ -8,7 +8,7 @@
 
 struct tiff;
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// The samples of a page of a TIFF file.
 struct TiffPage {

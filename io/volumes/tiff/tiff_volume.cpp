@@ -13,7 +13,7 @@
 #include "io/volumes/tiff/tiff_description.h"
 #include "io/volumes/tiff/tiff_page.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// Where a page is.

@@ -6,7 +6,7 @@
 
 #include <isobrick/volume_request.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Opens the pages of TIFF files, one file after the other, as the planes of a
 /// volume. `name` is what they are called together.

@@ -5,7 +5,7 @@
 
 #include <isobrick/vec.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Distances from a triangle, which may be as thin as a line or a point. In float:
 /// its corners should be near zero and its edges not far from 1 long.

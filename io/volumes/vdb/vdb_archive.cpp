@@ -18,7 +18,7 @@
 #include "io/volumes/vdb/vdb_half_grid.h"
 #include "io/volumes/vdb/vdb_leaves.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 namespace {
 

@@ -16,7 +16,7 @@
 #include "io/volumes/vdb/vdb_header.h"
 #include "io/volumes/vdb/vdb_stream.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// A grid that is in memory, its leaves' values included.
 struct VdbLoadedGrid {

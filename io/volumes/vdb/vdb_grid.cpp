@@ -11,7 +11,7 @@
 #include "io/bytes/writer_stream.h"
 #include "io/volumes/vdb/vdb_header.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 openvdb::math::Transform::Ptr grid_transform(const Transform& t) {

@@ -10,7 +10,7 @@
 #include <isobrick/volume_source.h>
 #include "io/bytes/output_file.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// The item of a grid's metadata that keeps the unit of world space.
 inline constexpr const char* kVdbUnit = "unit";

@@ -2,7 +2,7 @@
 
 #include <openvdb/openvdb.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// A grid of 16-bit floats, in memory too. OpenVDB writes them since version 13, and
 /// calls the type HalfGrid; older versions can make it all the same.

@@ -13,7 +13,7 @@
 #include "core/printable.h"
 #include "io/bytes/file.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 static_assert(std::endian::native == std::endian::little, "OpenVDB's files are little endian");

@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// A grid of an OpenVDB file before any tree is read.
 struct VdbGrid {

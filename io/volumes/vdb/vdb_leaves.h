@@ -20,7 +20,7 @@
 #include "io/bytes/file.h"
 #include "io/volumes/vdb/vdb_stream.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// What a tree's nodes are, its leaves without their values.
 struct VdbNodeCounts {

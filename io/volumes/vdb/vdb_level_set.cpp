@@ -16,7 +16,7 @@
 #include "io/volumes/vdb/vdb_grid.h"
 #include "io/volumes/vdb/vdb_tree.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// So many pairs of a leaf and a triangle that comes near it are listed at a time: of wide

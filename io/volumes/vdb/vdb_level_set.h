@@ -10,7 +10,7 @@
 #include <isobrick/volume_source.h>
 #include "io/bytes/output_file.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// An OpenVDB level set of a surface: near it distances from its triangles, negative
 /// inside, and elsewhere the largest of them. First come all triangles, in any

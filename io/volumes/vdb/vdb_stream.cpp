@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 constexpr std::size_t kBufferBytes = std::size_t{1} << 16;

@@ -12,7 +12,7 @@
 
 #include "io/bytes/file.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// A file to be read forward with many small steps: at every node OpenVDB queries the position and
 /// skips some bytes, which costs no system call here. Places behind the end

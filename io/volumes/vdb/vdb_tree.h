@@ -13,7 +13,7 @@
 #include <utility>
 #include <vector>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Whether two values have the same bits: a NaN equals itself.
 template <class T>

@@ -18,7 +18,7 @@
 #include "io/volumes/vdb/vdb_leaves.h"
 #include "io/volumes/vdb/vdb_tree.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// `Leaves` knows the values of the tree's leaves: VdbLeaves or VdbLoadedLeaves.

@@ -5,7 +5,7 @@
 
 #include <isobrick/volume_request.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Opens a grid of an OpenVDB file: the one that `request.grid` names, or the only one that can be
 /// a volume. The grid's tree and its leaves' masks are held in memory, in OpenVDB's own sparse

@@ -8,7 +8,7 @@
 #include "io/volumes/vdb/vdb_grid.h"
 #include "io/volumes/vdb/vdb_tree.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 template <class Sample, class Grid>

@@ -8,7 +8,7 @@
 #include <isobrick/volume_source.h>
 #include "io/bytes/output_file.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// An OpenVDB grid that grows box by box. It is held in OpenVDB's sparse form:
 /// samples that are `info.fill_value` take no room, constant cubes hardly any.

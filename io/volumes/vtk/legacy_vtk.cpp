@@ -17,7 +17,7 @@
 #include "io/volumes/raw/text_header.h"
 #include "io/volumes/stream_source.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 struct Header {

@@ -5,7 +5,7 @@
 
 #include <isobrick/volume_request.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Opens a legacy VTK file (`.vtk`) of STRUCTURED_POINTS: the first of its point
 /// data, or cell data where it has no others, which must be SCALARS or a FIELD.

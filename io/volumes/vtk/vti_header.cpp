@@ -13,7 +13,7 @@
 #include "io/volumes/raw/text_header.h"
 #include "io/vtk/vtk_xml.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// Takes the elements of an image, until the array of samples can be chosen.

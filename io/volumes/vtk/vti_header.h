@@ -9,7 +9,7 @@
 #include "io/vtk/vtk_arrays.h"
 #include "io/vtk/vtk_file.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Describes one array of a VTK image file (`.vti`).
 struct VtiHeader {

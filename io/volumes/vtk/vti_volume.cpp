@@ -8,7 +8,7 @@
 #include "io/volumes/stream_source.h"
 #include "io/volumes/vtk/vti_header.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 std::unique_ptr<VolumeSource> open_vti(const std::string& path, const std::string& array,
                                        const VolumeRequest& request) {

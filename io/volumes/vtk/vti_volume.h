@@ -5,7 +5,7 @@
 
 #include <isobrick/volume_request.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Opens a VTK image file (`.vti`): its array `array`, or its scalars where that
 /// is empty.

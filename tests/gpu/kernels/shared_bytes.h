@@ -7,7 +7,7 @@
 #include <sanitizer/asan_interface.h>
 #endif
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 
 /// What kernels declare as `extern __shared__`: of each thread of the CPU, so of each block.
 extern thread_local unsigned char shared_bytes[] __attribute__((aligned(256)));

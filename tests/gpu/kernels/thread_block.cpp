@@ -10,7 +10,7 @@
 #include "tests/gpu/kernels/fiber.h"
 #include "tests/gpu/kernels/shared_bytes.h"
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 
 thread_local unsigned char shared_bytes[emulated::kMaxSharedBytes] __attribute__((aligned(256)));
 

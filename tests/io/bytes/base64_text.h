@@ -4,7 +4,7 @@
 #include <string>
 #include <string_view>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// `bytes` in base64, padded.
 inline std::string base64(std::string_view bytes) {

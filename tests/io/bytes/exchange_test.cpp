@@ -5,7 +5,7 @@
 
 #include "temp_dir.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 namespace fs = std::filesystem;

@@ -8,7 +8,7 @@
 
 #include "temp_dir.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 TEST(File, ReadsAtOffsets) {

@@ -9,7 +9,7 @@
 
 #include "packed.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// What inflate() makes of `packed`, and the text in an output of `room` bytes.

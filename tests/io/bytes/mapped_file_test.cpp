@@ -2,7 +2,7 @@
 
 #include "tests/io/bytes/temp_dir.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 std::string text_of(const MappedFile& file) {

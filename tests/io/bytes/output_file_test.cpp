@@ -16,7 +16,7 @@
 #include "temp_dir.h"
 #include "tests/io/meshes/test_meshes.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 using Names = std::vector<std::string>;

@@ -7,7 +7,7 @@
 #include "io/bytes/output_guard.h"
 #include "temp_dir.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 namespace fs = std::filesystem;

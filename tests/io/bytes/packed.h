@@ -6,7 +6,7 @@
 #include <string>
 #include <string_view>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// `bytes`, compressed by zlib: one gzip member, or a zlib stream.
 inline std::string pack(std::string_view bytes, bool gzip, int level = 6) {

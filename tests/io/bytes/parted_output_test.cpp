@@ -11,7 +11,7 @@
 #include "temp_dir.h"
 #include "tests/io/meshes/test_meshes.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 namespace fs = std::filesystem;

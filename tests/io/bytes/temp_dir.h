@@ -14,7 +14,7 @@
 
 #include <isobrick/error.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// A folder of its own for each test, gone afterwards.
 class TempDir {

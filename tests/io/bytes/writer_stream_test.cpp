@@ -11,7 +11,7 @@
 #include "io/bytes/writer_stream.h"
 #include "tests/io/bytes/temp_dir.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 TEST(WriterStream, AppendsAndReplacesWhatIsBehind) {

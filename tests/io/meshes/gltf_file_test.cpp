@@ -10,7 +10,7 @@
 #include "tests/io/bytes/temp_dir.h"
 #include "tests/io/meshes/mesh_files.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// A GLB's scene as a .gltf whose buffer is at `uri`.

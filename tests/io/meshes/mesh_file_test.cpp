@@ -14,7 +14,7 @@
 #include "tests/io/bytes/temp_dir.h"
 #include "tests/io/meshes/mesh_files.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 TEST(MeshFile, ReadsWhatTheSinksWrite) {

@@ -13,7 +13,7 @@
 
 // Mesh files that the tests write, and what is read from them.
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 inline constexpr std::uint32_t kRings = 20;
 

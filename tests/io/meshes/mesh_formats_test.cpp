@@ -14,7 +14,7 @@
 #include "mesh_reader.h"
 
 // Every format against the same mesh as PLY has it.
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 namespace fs = std::filesystem;

@@ -8,7 +8,7 @@
 #include <sstream>
 #include <stdexcept>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 template <class T>

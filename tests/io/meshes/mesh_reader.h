@@ -5,7 +5,7 @@
 #include "test_meshes.h"
 #include "tests/io/bytes/temp_dir.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 // Small readers of what the sinks write, independent of them. Each expects what
 // the format specifies and fails the test otherwise; none is meant for other files.

@@ -8,7 +8,7 @@
 #include "test_meshes.h"
 #include "tests/io/bytes/temp_dir.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 std::string header_of(const std::string& file) {

@@ -7,7 +7,7 @@
 #include "test_meshes.h"
 #include "tests/io/bytes/temp_dir.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 struct Facet {

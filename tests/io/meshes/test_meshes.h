@@ -5,7 +5,7 @@
 
 #include <isobrick/mesh.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 struct TestMesh {
   std::vector<Vec3f> positions, normals;

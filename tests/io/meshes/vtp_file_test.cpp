@@ -10,7 +10,7 @@
 #include "tests/io/bytes/temp_dir.h"
 #include "tests/io/meshes/test_meshes.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 template <class T>

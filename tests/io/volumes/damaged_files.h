@@ -15,7 +15,7 @@
 #include "test_samples.h"
 #include "tests/io/bytes/temp_dir.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Opens a damaged file and reads of it what fits a small budget. It may be
 /// readable all the same; otherwise one line must have the reason and the file.

@@ -7,7 +7,7 @@
 #include "text_volume.h"
 
 // Files of samples that are missing, too short or too long for the header that describes them.
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 using DataFile = TextVolume;

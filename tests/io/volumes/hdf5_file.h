@@ -7,7 +7,7 @@
 
 #include <isobrick/vec.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 constexpr Int3 kExtent{19, 17, 5};
 constexpr Box3 kWhole{{0, 0, 0}, kExtent};

@@ -13,7 +13,7 @@
 #include "damaged_files.h"
 #include "hdf5_file.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 class Hdf5 : public ::testing::Test {

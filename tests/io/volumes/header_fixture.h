@@ -11,7 +11,7 @@
 #include "test_samples.h"
 #include "tests/io/bytes/temp_dir.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Tests of one format of headers, whose data file is v.raw: 7×5×4 samples of
 /// i16, big endian.

@@ -4,7 +4,7 @@
 
 #include "header_fixture.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 constexpr const char* kPlain =

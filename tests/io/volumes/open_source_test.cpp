@@ -8,7 +8,7 @@
 #include "test_samples.h"
 #include "tests/io/bytes/temp_dir.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 constexpr Int3 kExtent{7, 5, 4};

@@ -9,7 +9,7 @@
 #include "test_samples.h"
 #include "tests/io/bytes/temp_dir.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 constexpr SynthKind kKinds[] = {SynthKind::sphere, SynthKind::gyroid, SynthKind::marschner_lobb,

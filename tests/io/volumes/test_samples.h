@@ -9,7 +9,7 @@
 #include <isobrick/vec.h>
 #include <isobrick/volume_source.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// A sample whose value is its place, within every type.
 template <class T>

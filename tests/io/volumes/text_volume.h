@@ -8,7 +8,7 @@
 #include "tests/io/bytes/temp_dir.h"
 #include "tests/io/volumes/test_samples.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 constexpr Int3 kExtent{7, 5, 4};
 constexpr Box3 kWhole{{0, 0, 0}, kExtent};

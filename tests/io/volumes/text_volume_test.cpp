@@ -9,7 +9,7 @@
 #include "text_volume.h"
 
 // NRRD and MetaImage files with everything that their headers may have.
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 namespace fs = std::filesystem;

@@ -8,7 +8,7 @@
 #include <isobrick/open_source.h>
 #include "damaged_files.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 constexpr Int3 kExtent{19, 17, 5};

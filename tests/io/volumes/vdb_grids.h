@@ -12,7 +12,7 @@
 #include "tests/io/bytes/temp_dir.h"
 #include "tests/io/volumes/test_samples.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// A small number as a value, which may be a half: those are made of floats.
 template <class Value>

@@ -6,7 +6,7 @@
 #include "vdb_grids.h"
 
 // OpenVDB files of other versions, and streams.
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 using VdbLayouts = Vdb;

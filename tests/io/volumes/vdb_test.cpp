@@ -10,7 +10,7 @@
 #include "io/volumes/vdb/vdb_writer.h"
 #include "vdb_grids.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 constexpr std::uint64_t kMiB = std::uint64_t{1} << 20;

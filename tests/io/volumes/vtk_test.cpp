@@ -10,7 +10,7 @@
 #include "tests/io/bytes/packed.h"
 #include "tests/io/bytes/temp_dir.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 constexpr Int3 kExtent{7, 5, 4};

@@ -4,7 +4,7 @@
 
 #include <cstdint>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 constexpr double kLimit = 0.05;

@@ -7,7 +7,7 @@
 #include <isobrick/error.h>
 #include "tests/io/bytes/temp_dir.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 Bookmark jaw() {

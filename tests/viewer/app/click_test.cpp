@@ -1,7 +1,7 @@
 #include "core/vectors.h"
 #include "tests/viewer/app/window_test.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 constexpr int kWidth = test::kWindowWidth, kHeight = test::kWindowHeight;

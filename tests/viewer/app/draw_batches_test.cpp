@@ -5,7 +5,7 @@
 #include <isobrick/error.h>
 #include "tests/viewer/app/scene_renderer_fixture.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// A limit so short that a frame takes many batches on any machine.

@@ -9,7 +9,7 @@
 #include "tests/viewer/app/window_test.h"
 #include "viewer/app/viewer_window.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// A finished frame of many triangles, and a pacer without time for them.

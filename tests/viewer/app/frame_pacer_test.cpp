@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cstdint>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// Simulates previews of a surface of `full` triangles; a million take `seconds_per_million`.

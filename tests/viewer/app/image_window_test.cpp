@@ -12,7 +12,7 @@
 
 // Images with channels and times; messages about isovalues and the input.
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 constexpr int kEdge = 40;

@@ -9,7 +9,7 @@
 #include <isobrick/open_source.h>
 #include "tests/io/bytes/temp_dir.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 ImportJob::State finished(const ImportJob& job) {

@@ -10,7 +10,7 @@
 #include "tests/pipeline/drop_histogram.h"
 #include "tests/viewer/app/scene_renderer_fixture.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 bool comes(const std::function<bool()>& holds) {

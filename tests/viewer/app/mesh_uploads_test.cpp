@@ -11,7 +11,7 @@
 #include "tests/io/meshes/test_meshes.h"
 #include "viewer/render/gl_context.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 template <class T>

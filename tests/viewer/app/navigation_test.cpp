@@ -6,7 +6,7 @@
 
 #include "core/vectors.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 Navigator navigator(NavigationMode mode) {

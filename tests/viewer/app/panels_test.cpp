@@ -12,7 +12,7 @@
 #include "tests/viewer/app/imgui_version.h"
 #include "tests/viewer/app/scene_renderer_fixture.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// Panels without a window: frames of Dear ImGui that are not drawn, a pointer and keys.

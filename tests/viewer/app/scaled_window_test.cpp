@@ -9,7 +9,7 @@
 
 // Displays with a scale.
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 using ScaledDisplay = test::WindowTest;

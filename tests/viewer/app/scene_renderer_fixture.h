@@ -14,7 +14,7 @@
 #include "viewer/app/scene_renderer.h"
 #include "viewer/render/gl_context.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 inline constexpr int kWidth = 320, kHeight = 240;
 

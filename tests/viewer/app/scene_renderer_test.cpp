@@ -15,7 +15,7 @@
 #include "viewer/app/pick.h"
 #include "viewer/app/screenshot.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 TEST_F(SceneRendererTest, ShowsTheSurfaceWhereItIs) {

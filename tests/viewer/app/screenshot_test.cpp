@@ -4,7 +4,7 @@
 
 #include "tests/io/bytes/temp_dir.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 TEST(FreeName, IsThatOfNoFile) {

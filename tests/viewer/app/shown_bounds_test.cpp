@@ -6,7 +6,7 @@
 
 // The finest level of a picture, and its framing.
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 using ShownBounds = SceneRendererTest;

@@ -8,7 +8,7 @@
 
 // Pictures of several surfaces.
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 TEST_F(SceneRendererTest, SeveralSurfacesAreToldApart) {

@@ -8,7 +8,7 @@
 #include <isobrick/volume_source.h>
 #include "tests/viewer/app/scene_renderer_fixture.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// Rods along z, four samples thick: coarse levels lose them.

@@ -21,7 +21,7 @@
 #include "tests/viewer/app/imgui_version.h"
 #include "tests/viewer/app/window_test.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 constexpr int kWidth = test::kWindowWidth, kHeight = test::kWindowHeight;

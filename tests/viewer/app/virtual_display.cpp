@@ -15,7 +15,7 @@
 // glfw3native.h needs headers of XRandR for this.
 extern "C" Window glfwGetX11Window(GLFWwindow* window);
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 struct VirtualDisplay::State {
   pid_t server = -1;

@@ -5,7 +5,7 @@
 
 struct GLFWwindow;
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// A display without a screen (Xvfb), with simulated input (the XTEST extension). DISPLAY names it
 /// while it lives.

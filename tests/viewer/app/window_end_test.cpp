@@ -7,7 +7,7 @@
 #include "tests/tools/program.h"
 #include "tests/viewer/app/window_test.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// How a window ends, or does not end.

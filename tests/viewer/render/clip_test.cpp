@@ -8,7 +8,7 @@
 #include "tests/io/meshes/test_meshes.h"
 #include "tests/viewer/render/pictures.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 constexpr int kWidth = 200, kHeight = 160;

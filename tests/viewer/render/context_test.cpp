@@ -9,7 +9,7 @@
 #include "tests/viewer/render/pictures.h"
 #include "viewer/render/camera_request.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 std::size_t open_files() {

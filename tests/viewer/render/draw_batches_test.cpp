@@ -10,7 +10,7 @@
 #include "tests/io/meshes/test_meshes.h"
 #include "tests/viewer/render/pictures.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 constexpr int kWidth = 230, kHeight = 170;

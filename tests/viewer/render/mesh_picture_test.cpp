@@ -13,7 +13,7 @@
 #include "tests/io/meshes/mesh_files.h"
 #include "viewer/render/gl_context.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// A picture of a triangle from above.

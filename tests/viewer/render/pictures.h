@@ -9,7 +9,7 @@
 #include "viewer/render/gl_context.h"
 #include "viewer/render/renderer.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// Tests with a context of their own; skipped without EGL.
 class RenderTest : public ::testing::Test {

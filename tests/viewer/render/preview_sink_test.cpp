@@ -11,7 +11,7 @@
 #include "tests/io/meshes/test_meshes.h"
 #include "tests/viewer/render/png_picture.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 using Picture = test::PngPicture;

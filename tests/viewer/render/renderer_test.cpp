@@ -12,7 +12,7 @@
 #include "tests/viewer/render/pictures.h"
 #include "viewer/render/gl_objects.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 Camera front_camera(double aspect) {

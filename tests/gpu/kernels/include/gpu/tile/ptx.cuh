@@ -6,7 +6,7 @@
 
 // What gpu/tile/ptx.cuh has, on a CPU. Shared memory is addressed from its first byte on.
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 
 inline unsigned own_thread() { return threadIdx.x; }
 
