@@ -17,7 +17,7 @@
 #include "viewer/render/picture_targets.h"
 #include "viewer/render/picture_work.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// Depth as a world length, from a word of PictureResult::front.
@@ -28,9 +28,9 @@ float depth_of_front(const Camera& camera, std::uint32_t word) {
   return static_cast<float>(camera.orthographic ? far - stored * (far - near) : near / stored);
 }
 
-/// Measured with Mesa's llvmpipe: 66 MiB of libraries, 12 of shaders, about 12 of triangles. Shaders
-/// that its cache lacks take 8 MiB more; some runs take 26 MiB more than most while other processes
-/// draw.
+/// Measured with Mesa's llvmpipe: 66 MiB of libraries, 12 of shaders, about 12 of triangles.
+/// Shaders that its cache lacks take 8 MiB more; some runs take 26 MiB more than most while other
+/// processes draw.
 constexpr std::uint64_t kLibraries = std::uint64_t{96} << 20, kOfRenderer = std::uint64_t{30} << 20;
 
 int samples_of(const PictureSettings& settings) { return settings.multisample ? kSamples : 1; }

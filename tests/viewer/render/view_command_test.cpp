@@ -178,7 +178,7 @@ TEST_F(ViewCommand, SaysThatAPictureIsCoarserThanAskedFor) {
     return run({"view", path("g.zarr"), "--screenshot", path("g.png"), "--size", "400x300",
                 "--pixel-error", "0.5", "--memory", memory, "--force", "--no-occlusion"});
   };
-  const Outcome coarse = view("184M"), fine = view("1G");
+  const Outcome coarse = view("210M"), fine = view("1G");
   EXPECT_EQ(coarse.exit_code, 0) << coarse.err;
   EXPECT_NE(coarse.err.find("--memory"), std::string::npos) << coarse.err;
   EXPECT_EQ(fine.exit_code, 0) << fine.err;
