@@ -1,11 +1,15 @@
-# Static libraries, headers, the program with its man page and completions, and
-# a package: find_package(isobrick) then isobrick::pipeline, isobrick::surface, ….
+# Libraries, headers, the program with its man page and completions, and packages:
+# find_package(isobrick) then isobrick::isobrick, isobrick::pipeline, …, and pkg-config isobrick.
 include(CMakePackageConfigHelpers)
 
 set(isobrick_package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/isobrick)
 
 get_property(libraries GLOBAL PROPERTY isobrick_libraries)
-install(TARGETS ${libraries} EXPORT isobrick_targets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
+if(BUILD_SHARED_LIBS)
+  list(APPEND libraries isobrick_isobrick)
+endif()
+install(TARGETS ${libraries} EXPORT isobrick_targets
+  ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
 install(DIRECTORY include/isobrick DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
 install(EXPORT isobrick_targets NAMESPACE isobrick:: DESTINATION ${isobrick_package_dir})
 
@@ -23,6 +27,8 @@ write_basic_package_version_file(${PROJECT_BINARY_DIR}/isobrick-config-version.c
   COMPATIBILITY SameMinorVersion)
 install(FILES ${PROJECT_BINARY_DIR}/isobrick-config.cmake
   ${PROJECT_BINARY_DIR}/isobrick-config-version.cmake DESTINATION ${isobrick_package_dir})
+
+include(cmake/pkg_config.cmake)
 
 if(ISOBRICK_BUILD_TOOLS)
   install(TARGETS isobrick RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})

@@ -1,5 +1,5 @@
 # cmake -D BUILD=… -D PROJECT=… -D WORK=… -D COMPILER=… -D FLAGS=… -D MODULES=… -D VIEWER=…
-#       -D GENERATOR=… -P check_install.cmake
+#       -D GENERATOR=… -D CUDA=… -D SHARED=… -P check_install.cmake
 # Installs the build tree into a fresh prefix, then configures, builds and runs the consumer
 # against it, where no library of windows, OpenGL or CUDA is found.
 function(run)
@@ -25,6 +25,45 @@ run(${WORK}/build/store ${WORK}/sphere.zarr ${WORK}/surface.ply)
 foreach(program array simulation cancel)
   run(${WORK}/build/${program})
 endforeach()
+
+# The program that uses CUDA itself, run where there is a device.
+if(CUDA)
+  run(${CMAKE_COMMAND} -DDEVICE=ON -DCMAKE_DISABLE_FIND_PACKAGE_CUDAToolkit=OFF ${WORK}/build)
+  run(${CMAKE_COMMAND} --build ${WORK}/build --target device)
+  execute_process(COMMAND nvidia-smi RESULT_VARIABLE no_device OUTPUT_QUIET ERROR_QUIET)
+  if(no_device EQUAL 0)
+    run(${WORK}/build/device)
+  endif()
+endif()
+
+# The same library for those who build with pkg-config.
+set(ENV{PKG_CONFIG_PATH} ${prefix}/lib/pkgconfig:${prefix}/${LIBDIR}/pkgconfig)
+execute_process(COMMAND pkg-config --cflags --libs isobrick OUTPUT_VARIABLE flags
+  OUTPUT_STRIP_TRAILING_WHITESPACE COMMAND_ERROR_IS_FATAL ANY)
+separate_arguments(flags)
+separate_arguments(own_flags UNIX_COMMAND "${FLAGS}")
+run(${COMPILER} ${PROJECT}/array.cpp -o ${WORK}/by_pkg_config ${own_flags} ${flags})
+set(ENV{LD_LIBRARY_PATH} ${prefix}/${LIBDIR})
+run(${WORK}/by_pkg_config)
+unset(ENV{LD_LIBRARY_PATH})
+
+# What the shared library shows, and by what name programs ask for it.
+if(SHARED)
+  set(library ${prefix}/${LIBDIR}/libisobrick.so)
+  execute_process(COMMAND readelf -d ${library} OUTPUT_VARIABLE dynamic COMMAND_ERROR_IS_FATAL ANY)
+  if(NOT dynamic MATCHES "SONAME.*libisobrick.so.[0-9]+.[0-9]+\\]")
+    message(FATAL_ERROR "no SONAME with a version:\n${dynamic}")
+  endif()
+  execute_process(COMMAND nm -DC --defined-only ${library} OUTPUT_VARIABLE symbols
+    COMMAND_ERROR_IS_FATAL ANY)
+  string(REPLACE "\n" ";" symbols "${symbols}")
+  list(FILTER symbols EXCLUDE REGEX
+    " (isobrick::v0::|(vtable|typeinfo|typeinfo name) for isobrick::v0::)|^$")
+  if(symbols)
+    list(JOIN symbols "\n" symbols)
+    message(FATAL_ERROR "symbols that are not the interface:\n${symbols}")
+  endif()
+endif()
 
 # What draws requires libraries of windows, which are not found.
 if(VIEWER)
