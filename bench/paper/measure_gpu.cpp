@@ -185,14 +185,9 @@ class GpuMeasurement {
 }  // namespace
 
 nlohmann::json measure_gpu(const LoadedVolume& v, const MeasureOptions& options) {
-  switch (v.type) {
-    case ScalarType::u8: return GpuMeasurement<std::uint8_t>(v, options).run();
-    case ScalarType::i8: return GpuMeasurement<std::int8_t>(v, options).run();
-    case ScalarType::u16: return GpuMeasurement<std::uint16_t>(v, options).run();
-    case ScalarType::i16: return GpuMeasurement<std::int16_t>(v, options).run();
-    case ScalarType::f32: return GpuMeasurement<float>(v, options).run();
-    default: return nullptr;  // no kernels
-  }
+  return visit_scalar(v.type, [&](auto tag) {
+    return GpuMeasurement<typename decltype(tag)::type>(v, options).run();
+  });
 }
 
 }  // namespace isobrick::bench

@@ -12,11 +12,11 @@
 #include "gpu/stream/stream_device.h"
 #include "gpu/tile/supported.h"
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 namespace {
 
 SurfaceOptions checked(const Lattice& lattice, SurfaceOptions options) {
-  check_supported(lattice.type, options);
+  check_supported(options);
   options.may_have_nan = options.may_have_nan && is_floating(lattice.type);
   if (std::isnan(options.isovalue)) throw UsageError("the isovalue is not a number");
   options.roi = intersect(options.roi, lattice.box());

@@ -12,7 +12,7 @@
 #include "surface/cpu_extractor.h"
 #include "surface/world_map.h"
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 
 namespace {
 
@@ -85,7 +85,6 @@ bool StreamDevice::allocate(const StreamSizes& sizes) {
     params_.roi_hi[axis] = static_cast<std::int32_t>(options_.roi.hi[axis]);
   }
   params_.isovalue = options_.isovalue;
-  params_.vertex_isovalue = static_cast<float>(options_.isovalue);
   params_.world = world;
   params_.diagonal = is_diagonal(world);
   params_.unwelded = options_.indexing == Indexing::chunk_local;

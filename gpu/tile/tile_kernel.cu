@@ -1,23 +1,22 @@
 #include "gpu/tile/tile_kernel.h"
 
 #include <isobrick/error.h>
-#include "gpu/memory/device_scalar.h"
 #include "gpu/tile/tile_launcher.cuh"
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 namespace {
 
 template <int N>
 LaunchShape shape_of(const TileKernel& kernel) {
-  return visit_device_scalar(kernel.type, [&](auto tag) {
+  return visit_scalar(kernel.type, [&](auto tag) {
     using T = typename decltype(tag)::type;
     return kernel.normals ? Launcher<N, T, true>::shape() : Launcher<N, T, false>::shape();
   });
 }
 
+template <class T>
 LaunchShape nan_shape(bool normals) {
-  return normals ? Launcher<384, float, true, true>::shape()
-                 : Launcher<384, float, false, true>::shape();
+  return normals ? Launcher<384, T, true, true>::shape() : Launcher<384, T, false, true>::shape();
 }
 
 }  // namespace
@@ -25,7 +24,9 @@ LaunchShape nan_shape(bool normals) {
 LaunchShapes launch_shapes(const TileKernel& kernel) {
   LaunchShapes shapes;
   if (kernel.may_have_nan)
-    shapes.shapes[0] = shapes.shapes[1] = shapes.shapes[2] = nan_shape(kernel.normals);
+    shapes.shapes[0] = shapes.shapes[1] = shapes.shapes[2] = kernel.type == ScalarType::f64
+                                                                 ? nan_shape<double>(kernel.normals)
+                                                                 : nan_shape<float>(kernel.normals);
   else
     shapes = {shape_of<1024>(kernel), shape_of<640>(kernel), shape_of<384>(kernel)};
   if (shapes.shapes[2].blocks == 0)

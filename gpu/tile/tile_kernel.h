@@ -6,13 +6,13 @@
 #include <isobrick/surface_options.h>
 #include "gpu/tile/tile_params.h"
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 
 /// Which kernel makes a surface.
 struct TileKernel {
   ScalarType type;
   bool normals = false;
-  bool may_have_nan = false;  ///< of f32 only
+  bool may_have_nan = false;  ///< of f32 and f64 only
 };
 inline TileKernel kernel_of(ScalarType type, const SurfaceOptions& options) {
   return {type, options.normals, options.may_have_nan && is_floating(type)};

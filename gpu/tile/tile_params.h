@@ -7,7 +7,7 @@
 
 // What the host hands to the extraction kernel. Plain data, no CUDA header.
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 
 /// A block holds the samples of one tile: 32³, C order [z, y, x].
 inline constexpr std::uint32_t kTileBlockSamples = 32 * 32 * 32;
@@ -118,7 +118,6 @@ struct TileParams {
   std::int32_t tiles[3];
   std::int32_t extent[3], roi_lo[3], roi_hi[3];  ///< samples
   double isovalue;
-  float vertex_isovalue;  ///< the isovalue in the precision of vertices
   WorldMap world;
   bool diagonal;  ///< the map has no term off the diagonal
   RowTable* row_tables;

@@ -5,7 +5,7 @@
 
 // The vertices of a tile, written where they belong.
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 
 /// Writes what nobody reads soon: samples of tiles to come stay in the L2 cache instead.
 __device__ inline void store_once(Vec3f& to, const Vec3f& v) {
@@ -49,7 +49,7 @@ __device__ inline EdgeOfVertex find_edge(const TileShared& s, At0 at_0, std::uin
 
 template <class T>
 struct VertexMaker {
-  using R = float;
+  using R = Real<T>;
   const TileShared& s;
   const TileParams& p;
   R iso;
@@ -59,8 +59,8 @@ struct VertexMaker {
   }
 
   __device__ float edge_parameter_of(R a, R b) const {
-    if constexpr (std::is_floating_point_v<T>) return edge_parameter(a, b, iso);
-    return (iso - a) / (b - a);
+    if constexpr (std::is_floating_point_v<T>) return static_cast<float>(edge_parameter(a, b, iso));
+    return static_cast<float>((iso - a) / (b - a));
   }
 
   /// Central difference, one-sided at the volume's border.
@@ -68,7 +68,7 @@ struct VertexMaker {
     const int global = s.shape.origin[axis] + at;
     const bool low = global == 0, high = global == p.extent[axis] - 1;
     const R d = (high ? here : after) - (low ? here : before);
-    return d * (low || high ? R(1) : R(0.5));
+    return static_cast<float>(d * (low || high ? R(1) : R(0.5)));
   }
 
   __device__ Vec3f gradient(int x, int y, int z, R here) const {
@@ -126,7 +126,7 @@ __device__ inline void write_listed_vertices_of(TileShared& s, const TileParams&
                                                 std::uint32_t first, std::uint32_t listed,
                                                 At0 at_0) {
   using Maker = VertexMaker<T>;
-  const Maker maker{s, p, p.vertex_isovalue};
+  const Maker maker{s, p, static_cast<typename Maker::R>(p.isovalue)};
   const auto& lists = lists_of<N>(s);
   Vec3f* const positions = kept(p.positions + s.vertex_base + first);
   Vec3f* const normals = Normals ? kept(p.normals + s.vertex_base + first) : nullptr;

@@ -7,7 +7,7 @@
 #include <isobrick/error.h>
 #include "gpu/tile/supported.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 namespace {
 
 /// What a thread takes for the surface in an active block, and what a device takes to set up
@@ -36,7 +36,7 @@ bool use_cuda(const ExtractRequest& request, const ExtractOptions& options,
               std::uint64_t active_blocks) {
   if (options.backend == Backend::cpu) return false;
   const bool must = options.backend == Backend::cuda;
-  const auto why = gpu::why_unsupported(request.level->lattice.type, request.surface);
+  const auto why = gpu::why_unsupported(request.surface);
   if (must && why) throw UsageError("--backend cuda: " + *why);
   if (must && !built_with_cuda())
     throw Error("--backend cuda: this isobrick was built without CUDA; use --backend cpu");

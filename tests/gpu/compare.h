@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <cstring>
+#include <limits>
 #include <random>
 #include <string>
 #include <vector>
@@ -114,15 +115,30 @@ class DeviceTest : public ::testing::Test, public TestFields<T> {
 };
 
 /// A field with NaN: here and there and as a box over the corner of eight tiles.
-inline Field<float> with_nan(Field<float> field, unsigned seed, int one_in) {
+template <class T>
+Field<T> with_nan(Field<T> field, unsigned seed, int one_in) {
+  constexpr T nan = std::numeric_limits<T>::quiet_NaN();
   std::mt19937 random(seed);
-  for (float& v : field.samples)
-    if (random() % static_cast<unsigned>(one_in) == 0) v = NAN;
+  for (T& v : field.samples)
+    if (random() % static_cast<unsigned>(one_in) == 0) v = nan;
   for_each_point(intersect({{30, 29, 31}, {34, 50, 33}}, field.box()),
-                 [&](Int3 p) { field.at(p) = NAN; });
+                 [&](Int3 p) { field.at(p) = nan; });
   return field;
 }
 
-using DeviceTypes = ::testing::Types<std::uint8_t, std::int8_t, std::uint16_t, std::int16_t, float>;
+inline constexpr double kWideIsovalue = 2e9 + 0.5;
+
+/// Waves around kWideIsovalue whose values are nearer to each other than floats are there.
+template <class T>
+Field<T> wide_field() {
+  return Field<T>({40, 37, 35}, [](Int3 p) {
+    const auto f = [](Index v, double k) { return std::sin(static_cast<double>(v) * k); };
+    return kWideIsovalue + 30 * (f(p.x, 0.31) + f(p.y, 0.23) + f(p.z, 0.17));
+  });
+}
+
+using TypesWithNaN = ::testing::Types<float, double>;
+using DeviceTypes = ::testing::Types<std::uint8_t, std::int8_t, std::uint16_t, std::int16_t,
+                                     std::uint32_t, std::int32_t, float, double>;
 
 }  // namespace isobrick::testing

@@ -118,11 +118,14 @@ TYPED_TEST(GpuResidentPart, APartOfAVolumeHasTheFillValueWhereBricksAreAbsent) {
                holed.options(0));
 }
 
-using GpuResidentPartWithNaN = DeviceTest<float>;
+template <class T>
+using GpuResidentPartWithNaN = DeviceTest<T>;
 
-TEST_F(GpuResidentPartWithNaN, TheTilesThatAreTouchedAreEnough) {
-  const auto field = with_nan(waves({131, 70, 97}), 1, 300);
-  const Lattice lattice{field.extent, {32, 32, 32}, ScalarType::f32};
+TYPED_TEST_SUITE(GpuResidentPartWithNaN, TypesWithNaN);
+
+TYPED_TEST(GpuResidentPartWithNaN, TheTilesThatAreTouchedAreEnough) {
+  const auto field = with_nan(this->waves({131, 70, 97}), 1, 300);
+  const Lattice lattice{field.extent, {32, 32, 32}, scalar_type_of<TypeParam>};
   compare_part(field, DenseBricks(lattice, field.samples.data()), lattice, {-40, 65},
                {.may_have_nan = true});
 }

@@ -256,20 +256,23 @@ TYPED_TEST(GpuResident, WhatTheDeviceCannotDoIsRefused) {
   EXPECT_THROW(extractor.extract(std::nan("")), UsageError);
 }
 
-using GpuResidentWithNaN = DeviceTest<float>;
+template <class T>
+using GpuResidentWithNaN = DeviceTest<T>;
 
-TEST_F(GpuResidentWithNaN, IsTheMeshOfTheCpu) {
+TYPED_TEST_SUITE(GpuResidentWithNaN, TypesWithNaN);
+
+TYPED_TEST(GpuResidentWithNaN, IsTheMeshOfTheCpu) {
   SurfaceOptions options;
   options.may_have_nan = true;
-  compare(waves({131, 70, 97}), {0, 30}, options);
-  compare(with_nan(waves({131, 70, 97}), 1, 300), {0, -40}, options, 32);
-  compare(with_nan(noise({67, 41, 75}, 2), 3, 20), {0}, options, 16);
-  compare(with_nan(noise({33, 32, 34}, 5), 4, 3), {0}, options);
-  compare(with_nan(waves({3, 1030, 1060}), 5, 50), {0}, options);
+  compare(this->waves({131, 70, 97}), {0, 30}, options);
+  compare(with_nan(this->waves({131, 70, 97}), 1, 300), {0, -40}, options, 32);
+  compare(with_nan(this->noise({67, 41, 75}, 2), 3, 20), {0}, options, 16);
+  compare(with_nan(this->noise({33, 32, 34}, 5), 4, 3), {0}, options);
+  compare(with_nan(this->waves({3, 1030, 1060}), 5, 50), {0}, options);
 }
 
-TEST_F(GpuResidentWithNaN, RegionsAndMirrors) {
-  const auto field = with_nan(noise({67, 41, 75}, 7), 8, 15);
+TYPED_TEST(GpuResidentWithNaN, RegionsAndMirrors) {
+  const auto field = with_nan(this->noise({67, 41, 75}, 7), 8, 15);
   for (const Box3 roi : {Box3{{5, 3, 7}, {60, 40, 70}}, Box3{{33, 0, 31}, {66, 39, 75}},
                          Box3{{31, 31, 31}, {34, 34, 34}}}) {
     SurfaceOptions options;
@@ -278,6 +281,14 @@ TEST_F(GpuResidentWithNaN, RegionsAndMirrors) {
     options.transform.spacing = {-1, 2, 1};
     compare(field, {0}, options);
   }
+}
+
+/// Samples that float cannot tell apart.
+TEST(GpuResidentOf, WideSamplesAreInterpolatedInDouble) {
+  if (!gpu::device_available()) GTEST_SKIP() << "no CUDA device";
+  compare(wide_field<std::uint32_t>(), {kWideIsovalue}, {});
+  compare(wide_field<std::int32_t>(), {kWideIsovalue}, {});
+  compare(wide_field<double>(), {kWideIsovalue, kWideIsovalue + 0.25}, {});
 }
 
 TYPED_TEST(GpuResident, IsovaluesBeyondTheRangeGiveNothing) {

@@ -276,19 +276,22 @@ TYPED_TEST(GpuStream, RegionsOfInterest) {
   }
 }
 
-using GpuStreamWithNaN = DeviceTest<float>;
+template <class T>
+using GpuStreamWithNaN = DeviceTest<T>;
 
-TEST_F(GpuStreamWithNaN, IsTheMeshOfTheCpu) {
+TYPED_TEST_SUITE(GpuStreamWithNaN, TypesWithNaN);
+
+TYPED_TEST(GpuStreamWithNaN, IsTheMeshOfTheCpu) {
   SurfaceOptions options;
   options.may_have_nan = true;
-  compare(with_nan(waves(kOdd), 1, 300), 0, options, kManyWays);
-  compare(with_nan(noise({67, 41, 75}, 2), 3, 20), 0, options, kManyWays);
+  compare(with_nan(this->waves(kOdd), 1, 300), 0, options, kManyWays);
+  compare(with_nan(this->noise({67, 41, 75}, 2), 3, 20), 0, options, kManyWays);
   for (const Int3 extent : {Int3{2, 2, 2}, Int3{33, 33, 33}, Int3{34, 35, 65}})
-    compare(with_nan(noise(extent, 4), 5, 8), 0, options, {{512}, {1, 1, 16}});
+    compare(with_nan(this->noise(extent, 4), 5, 8), 0, options, {{512}, {1, 1, 16}});
   options.roi = {{31, 2, 30}, {66, 39, 75}};
-  compare(with_nan(noise({67, 41, 75}, 2), 6, 20), 0, options, {{512}, {2, 3, 20}});
+  compare(with_nan(this->noise({67, 41, 75}, 2), 6, 20), 0, options, {{512}, {2, 3, 20}});
   options.indexing = Indexing::chunk_local;
-  compare(with_nan(noise({67, 41, 75}, 2), 6, 20), 0, options, {{512}, {8, 5, 20}});
+  compare(with_nan(this->noise({67, 41, 75}, 2), 6, 20), 0, options, {{512}, {8, 5, 20}});
 }
 
 TYPED_TEST(GpuStream, EveryTileAloneForFormatsWithoutSharing) {
@@ -356,8 +359,6 @@ TEST(GpuExtractor, WhatHasNoKernelsIsRefused) {
         gpu::GpuExtractor(0, lattice, options, gpu::stream_sizes(lattice, options, 1), sink),
         UsageError);
   };
-  refused(ScalarType::f64, [](SurfaceOptions&) {});
-  refused(ScalarType::i32, [](SurfaceOptions&) {});
   refused(ScalarType::u8, [](SurfaceOptions& o) { o.drop_degenerate = true; });
   refused(ScalarType::u8, [](SurfaceOptions& o) { o.isovalue = std::nan(""); });
   refused(ScalarType::u8, [](SurfaceOptions& o) { o.roi = {{99, 0, 0}, {100, 1, 1}}; });

@@ -18,6 +18,10 @@
 
 namespace isobrick::testing {
 
+/// One type of each kind: these kernels run slowly.
+using KernelTypes =
+    ::testing::Types<std::uint8_t, std::int8_t, std::uint16_t, std::int16_t, float, double>;
+
 /// The CPU's mesh, with one thread: ThreadSanitizer does not know what TBB does.
 template <class T>
 isobrick::Mesh expected_mesh(const Field<T>& field, const Lattice& lattice,
@@ -87,7 +91,6 @@ inline gpu::TileParams params_of(const Lattice& lattice, const SurfaceOptions& o
     p.roi_hi[axis] = static_cast<std::int32_t>(options.roi.hi[axis]);
   }
   p.isovalue = options.isovalue;
-  p.vertex_isovalue = static_cast<float>(options.isovalue);
   p.world = world_map(options.transform, options.inside);
   p.diagonal = is_diagonal(p.world);
   return p;
