@@ -2,40 +2,69 @@
 
 #include <cuda_runtime_api.h>
 
+#include <memory>
 #include <utility>
 
+#include <isobrick/device_array.h>
 #include "gpu/memory/cuda_check.h"
 
 // Owners of streams and events. Destructors wait for nothing and never throw, also
 // when the driver has already been shut down at exit.
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 
-/// Owns a stream that does not synchronise with the default one.
+/// A stream, and where memory that is allocated in its order comes from. Copies are of the same
+/// stream, which goes with the last of them.
 class Stream {
  public:
-  Stream() { check(cudaStreamCreateWithFlags(&stream_, cudaStreamNonBlocking)); }
-  Stream(Stream&& other) noexcept : stream_(std::exchange(other.stream_, nullptr)) {}
-  Stream& operator=(Stream&& other) noexcept {
-    std::swap(stream_, other.stream_);
-    return *this;
+  /// One that does not synchronise with the default one.
+  Stream() {
+    cudaStream_t stream = nullptr;
+    check(cudaStreamCreateWithFlags(&stream, cudaStreamNonBlocking));
+    state_ = std::make_shared<State>(stream, true, nullptr);
   }
-  ~Stream() {
-    if (stream_) (void)cudaStreamDestroy(stream_);
-  }
+  /// One of others. Memory of the device's own pool where `memory` is null.
+  Stream(cudaStream_t stream, std::shared_ptr<DeviceMemory> memory)
+      : state_(std::make_shared<State>(stream, false, std::move(memory))) {}
 
-  cudaStream_t get() const { return stream_; }
+  cudaStream_t get() const { return state_->stream; }
   /// Blocks until all work of the stream is done; throws what went wrong in it.
-  void wait() const { check(cudaStreamSynchronize(stream_)); }
+  void wait() const { check(cudaStreamSynchronize(get())); }
   /// Whether all work of the stream is done; throws what went wrong in it.
   bool is_over() const {
-    const cudaError_t state = cudaStreamQuery(stream_);
+    const cudaError_t state = cudaStreamQuery(get());
     if (state != cudaErrorNotReady) check(state);
     return state == cudaSuccess;
   }
 
+  void* allocate(std::size_t bytes) const {
+    if (state_->memory) return state_->memory->allocate(bytes, get());
+    void* memory = nullptr;
+    check(cudaMallocAsync(&memory, bytes, get()));
+    return memory;
+  }
+  void free(void* memory, std::size_t bytes) const noexcept {
+    if (state_->memory)
+      state_->memory->free(memory, bytes, get());
+    else
+      (void)cudaFreeAsync(memory, get());
+  }
+
  private:
-  cudaStream_t stream_ = nullptr;
+  struct State {
+    cudaStream_t stream;
+    bool is_owned;
+    std::shared_ptr<DeviceMemory> memory;
+
+    State(cudaStream_t s, bool owned, std::shared_ptr<DeviceMemory> m)
+        : stream(s), is_owned(owned), memory(std::move(m)) {}
+    State(const State&) = delete;
+    State& operator=(const State&) = delete;
+    ~State() {
+      if (is_owned) (void)cudaStreamDestroy(stream);
+    }
+  };
+  std::shared_ptr<const State> state_;
 };
 
 /// Owns an event that can measure time. With cudaEventBlockingSync a waiting thread

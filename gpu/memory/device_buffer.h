@@ -1,11 +1,12 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <utility>
 
 #include "gpu/memory/cuda_objects.h"
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 
 /// Owns `size` elements of device memory, uninitialised. Throws OutOfDeviceMemory where the device
 /// has less.
@@ -17,14 +18,14 @@ class DeviceBuffer {
   explicit DeviceBuffer(std::size_t size) : size_(size) {
     if (size_ > 0) check(cudaMalloc(&data_, size_ * sizeof(T)));
   }
-  /// Allocated and freed in the order of a stream, which must outlive it.
-  DeviceBuffer(std::size_t size, const Stream& stream) : size_(size), stream_(stream.get()) {
-    if (size_ > 0) check(cudaMallocAsync(&data_, size_ * sizeof(T), stream_));
+  /// Allocated and freed in the order of a stream.
+  DeviceBuffer(std::size_t size, const Stream& stream) : size_(size), stream_(stream) {
+    if (size_ > 0) data_ = stream.allocate(size_ * sizeof(T));
   }
   DeviceBuffer(DeviceBuffer&& other) noexcept
       : data_(std::exchange(other.data_, nullptr)),
         size_(std::exchange(other.size_, 0)),
-        stream_(other.stream_) {}
+        stream_(std::move(other.stream_)) {}
   DeviceBuffer& operator=(DeviceBuffer&& other) noexcept {
     std::swap(data_, other.data_);
     std::swap(size_, other.size_);
@@ -32,7 +33,11 @@ class DeviceBuffer {
     return *this;
   }
   ~DeviceBuffer() {
-    if (data_) (void)(stream_ ? cudaFreeAsync(data_, stream_) : cudaFree(data_));
+    if (!data_) return;
+    if (stream_)
+      stream_->free(data_, bytes());
+    else
+      (void)cudaFree(data_);
   }
 
   T* data() const { return static_cast<T*>(data_); }
@@ -42,7 +47,7 @@ class DeviceBuffer {
  private:
   void* data_ = nullptr;
   std::size_t size_ = 0;
-  cudaStream_t stream_ = nullptr;  ///< null: of no stream
+  std::optional<Stream> stream_;  ///< nothing: of no stream
 };
 
 }  // namespace isobrick::gpu

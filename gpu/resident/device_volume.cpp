@@ -7,14 +7,14 @@
 
 #include <isobrick/error.h>
 #include "core/morton.h"
-#include "gpu/memory/device_scalar.h"
 #include "gpu/memory/nvtx_range.h"
+#include "gpu/memory/pool_memory.h"
 #include "gpu/resident/device_volume_impl.h"
+#include "gpu/resident/pack_kernel.h"
 #include "gpu/search/search_kernel.h"
-#include "gpu/tile/supported.h"
 #include "gpu/tile/tile_block.h"
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 namespace {
 
 /// Bytes of samples that are gathered while the ones before are copied.
@@ -35,7 +35,6 @@ std::vector<Int3> all_tiles(const Lattice& lattice, bool in_morton_order) {
 DeviceVolume::Impl::Impl(const Lattice& l, double fill, const DeviceTiles& wanted,
                          std::size_t staging_bytes)
     : lattice(l), fill_value(fill) {
-  if (!is_device_scalar(l.type)) throw UsageError(*why_unsupported(l.type, {}));
   if (volume(l.tiles()) >= kNone)
     throw UsageError("the volume has too many tiles to be resident on a device");
   tile_blocks = DeviceBuffer<std::byte>((wanted.loaded.size() + 1) * block_bytes(), stream);
@@ -53,6 +52,47 @@ DeviceVolume::Impl::Impl(const Lattice& l, double fill, const DeviceTiles& wante
                         cudaMemcpyHostToDevice, stream.get()));
   staging_[0].copied.record(stream);
   if (wanted.loaded.empty()) complete();
+}
+
+DeviceVolume::Impl::Impl(const DeviceArray& array)
+    : lattice{array.extent, {64, 64, 64}, array.type},
+      fill_value(0),
+      stream(array.stream, array.memory ? array.memory : pool_memory()) {
+  if (volume(lattice.tiles()) >= kNone)
+    throw UsageError("the array has too many tiles to be resident on a device");
+  const std::size_t blocks = grid_tiles() + 1;
+  tile_blocks = DeviceBuffer<std::byte>(blocks * block_bytes(), stream);
+  columns = DeviceBuffer<std::byte>(blocks * kColumnSamples * lattice.sample_bytes(), stream);
+  check(cudaMemsetAsync(tile_blocks.data(), 0, block_bytes(), stream.get()));
+  list_tiles(all_tiles(lattice, true));
+  pack(array);
+}
+
+void DeviceVolume::Impl::pack(const DeviceArray& array) {
+  const NvtxRange range("pack an array");
+  const DeviceBuffer<std::byte> part_ranges(8 * ranges.bytes(), stream);
+  const DeviceBuffer<std::uint32_t> found_nan(1, stream);
+  check(cudaMemsetAsync(found_nan.data(), 0, found_nan.bytes(), stream.get()));
+  PackParams p{};
+  p.samples = array.samples;
+  for (int axis = 0; axis < 3; ++axis) {
+    p.strides[axis] = array.strides[axis] / static_cast<Index>(lattice.sample_bytes());
+    p.extent[axis] = static_cast<std::int32_t>(lattice.extent[axis]);
+    p.tiles[axis] = static_cast<std::int32_t>(lattice.tiles()[axis]);
+  }
+  p.order = tiles.data();
+  p.count = tile_count;
+  p.tile_blocks = tile_blocks.data();
+  p.columns = columns.data();
+  p.part_ranges = part_ranges.data();
+  p.ranges = ranges.data();
+  p.found_nan = found_nan.data();
+  launch_pack(lattice.type, p, stream.get());
+  std::uint32_t found = 0;
+  check(cudaMemcpyAsync(&found, found_nan.data(), sizeof found, cudaMemcpyDeviceToHost,
+                        stream.get()));
+  stream.wait();
+  has_nan = found != 0;
 }
 
 DeviceVolume::Impl::~Impl() {
@@ -147,6 +187,7 @@ DeviceVolume::DeviceVolume(const Lattice& lattice, const BrickLookup& bricks, do
 DeviceVolume::DeviceVolume(const Lattice& lattice, double fill_value, const DeviceTiles& tiles,
                            std::size_t staging_bytes)
     : impl_(std::make_unique<Impl>(lattice, fill_value, tiles, staging_bytes)) {}
+DeviceVolume::DeviceVolume(const DeviceArray& array) : impl_(std::make_unique<Impl>(array)) {}
 DeviceVolume::~DeviceVolume() = default;
 
 void DeviceVolume::load(std::span<const Int3> tiles, const BrickLookup& bricks) {
@@ -154,6 +195,8 @@ void DeviceVolume::load(std::span<const Int3> tiles, const BrickLookup& bricks) 
 }
 
 const Lattice& DeviceVolume::lattice() const { return impl_->lattice; }
+
+bool DeviceVolume::has_nan() const { return impl_->has_nan; }
 
 std::uint64_t DeviceVolume::bytes() const {
   return impl_->tile_blocks.bytes() + impl_->columns.bytes() + impl_->block_of_tile.bytes() +

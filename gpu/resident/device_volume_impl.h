@@ -7,11 +7,12 @@
 #include "gpu/memory/pinned_buffer.h"
 #include "gpu/tile/tile_params.h"
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 
 struct DeviceVolume::Impl {
   Lattice lattice;
   double fill_value;
+  bool has_nan = false;
   Stream stream;
   std::uint32_t tile_count = 0;               ///< that are searched
   DeviceBuffer<std::byte> tile_blocks;        ///< that of the fill value, then of the loaded tiles
@@ -22,6 +23,7 @@ struct DeviceVolume::Impl {
 
   Impl(const Lattice& lattice, double fill_value, const DeviceTiles& tiles,
        std::size_t staging_bytes);
+  explicit Impl(const DeviceArray& array);
   ~Impl();
 
   void load(std::span<const Int3> tiles, const BrickLookup& bricks);
@@ -41,6 +43,7 @@ struct DeviceVolume::Impl {
   void list_tiles(std::span<const Int3> searched);
   void load_staged(std::span<const Int3> tiles, const BrickLookup& bricks);
   void complete();
+  void pack(const DeviceArray& array);
 
   std::vector<std::uint32_t> table_;  ///< block_of_tile, until all are loaded
   std::size_t loaded_ = 0;            ///< tiles

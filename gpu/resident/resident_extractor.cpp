@@ -4,17 +4,19 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include <isobrick/error.h>
 #include "core/stopwatch.h"
 #include "gpu/memory/nvtx_range.h"
+#include "gpu/resident/device_mesh_impl.h"
 #include "gpu/resident/device_volume_impl.h"
 #include "gpu/resident/resident_launcher.h"
 #include "gpu/resident/resident_sizes.h"
 #include "surface/chunk_writer.h"
 #include "surface/surface_extractor.h"
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 namespace {
 
 /// Mesh to make room for before anything is known: a sheet across each tile, twice.
@@ -40,6 +42,9 @@ struct ResidentExtractor::Impl {
   std::uint64_t tile_bytes;  ///< of samples
   MeshRoom room;
   double isovalue = 0;
+  MeshSize taken;  ///< the room that the last taken mesh had
+  bool is_launched = false;
+  Stopwatch since_begin;
   DeviceCounts made;  ///< by the last extraction
   DeviceCounts last;  ///< what the last launch would have made
   SurfaceReport report;
@@ -91,24 +96,44 @@ struct ResidentExtractor::Impl {
     launcher.make_row_tables(tiles);
   }
 
-  DeviceCounts extract(double value) {
+  void begin(double value) {
     if (std::isnan(value)) throw UsageError("the isovalue is not a number");
     isovalue = value;
     report = {};
     made = {};  // a launch that fails leaves no mesh
-    Stopwatch watch;
+    is_launched = false;
+    (void)since_begin.lap();
+    if (taken.vertices > 0 && size_of_room().vertices == 0) make_room({}, taken);
+    launch();
+  }
+
+  DeviceCounts finish() {
     made = make();
+    is_launched = false;
     report.vertices = made.vertices;
     report.triangles = made.triangles;
-    report.kernel = {watch.lap(), made.active_tiles * tile_bytes +
-                                      mesh_bytes({made.vertices, made.triangles}, normals())};
+    report.kernel = {since_begin.lap(), made.active_tiles * tile_bytes +
+                                            mesh_bytes({made.vertices, made.triangles}, normals())};
     return made;
   }
 
+  void launch() {
+    is_launched = launcher.launch(isovalue, room, last);
+    report.launches += is_launched;
+  }
+
+  DeviceMesh take_mesh(const std::string& unit) {
+    if (made.triangles == 0 && made.vertices == 0) return {};
+    taken = size_of_room();
+    auto mesh =
+        std::make_shared<DeviceMesh::Impl>(device, stream(), std::exchange(room, {}), made, unit);
+    made = {};
+    return DeviceMesh(std::move(mesh));
+  }
+
   DeviceCounts make() {
-    for (;;) {
-      if (!launcher.launch(isovalue, room, last)) return {};
-      ++report.launches;
+    for (;; launch()) {
+      if (!is_launched) return {};
       last = launcher.wait();
       const MeshSize expected =
           room.positions.size() == 0 ? room_for(last.active_tiles) : MeshSize{};
@@ -129,6 +154,8 @@ struct ResidentExtractor::Impl {
       ++report.repeats;
     }
   }
+
+  bool is_over() const { return !is_launched || launcher.is_reported(); }
 
   void repeat() {
     start.record(stream());
@@ -212,7 +239,14 @@ ResidentExtractor::ResidentExtractor(DeviceVolume& volume, const SurfaceOptions&
     : impl_(std::make_unique<Impl>(volume, options, tuning, max_bytes)) {}
 ResidentExtractor::~ResidentExtractor() = default;
 
-DeviceCounts ResidentExtractor::extract(double isovalue) { return impl_->extract(isovalue); }
+DeviceCounts ResidentExtractor::extract(double isovalue) {
+  begin(isovalue);
+  return finish();
+}
+void ResidentExtractor::begin(double isovalue) { impl_->begin(isovalue); }
+bool ResidentExtractor::is_over() const { return impl_->is_over(); }
+DeviceCounts ResidentExtractor::finish() { return impl_->finish(); }
+DeviceMesh ResidentExtractor::take_mesh(const std::string& unit) { return impl_->take_mesh(unit); }
 void ResidentExtractor::repeat() { impl_->repeat(); }
 
 float ResidentExtractor::milliseconds() {

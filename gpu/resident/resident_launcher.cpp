@@ -7,21 +7,20 @@
 
 #include <isobrick/error.h>
 #include "core/threshold.h"
-#include "gpu/memory/device_scalar.h"
 #include "gpu/memory/nvtx_range.h"
 #include "gpu/resident/resident_sizes.h"
 #include "gpu/search/search_kernel.h"
 #include "gpu/tile/supported.h"
 #include "surface/world_map.h"
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 namespace {
 
 /// How often the host reads a report before it queries the driver for errors.
 constexpr std::uint32_t kReadsBetweenQueries = 4096;
 
 SurfaceOptions checked(SurfaceOptions options, const Lattice& lattice) {
-  check_supported(lattice.type, options);
+  check_supported(options);
   if (options.indexing != Indexing::welded)
     throw UsageError("a resident volume makes welded meshes only; use the CPU");
   options.roi = intersect(options.roi, lattice.box());
@@ -58,7 +57,6 @@ ResidentLauncher::ResidentLauncher(DeviceVolume::Impl& volume, const SurfaceOpti
   static_assert(kNone == 0xffffffffu);
   check(cudaMemsetAsync(slot_of_tile_.data(), 0xff, slot_of_tile_.bytes(), stream));
   make_row_tables(std::min(volume.tile_count, kFirstRowTables));
-  volume.stream.wait();
 }
 
 ResidentLauncher::~ResidentLauncher() {
@@ -72,7 +70,7 @@ std::size_t ResidentLauncher::search_blocks() const {
 
 /// Then no tile is active; brute force would take all.
 bool ResidentLauncher::is_above_all_samples(double isovalue) const {
-  return visit_device_scalar(volume_.lattice.type, [&](auto tag) {
+  return visit_scalar(volume_.lattice.type, [&](auto tag) {
     return Threshold<typename decltype(tag)::type>(isovalue).none;
   });
 }
@@ -135,7 +133,6 @@ void ResidentLauncher::launch_tiles(double isovalue, const MeshRoom& room,
   p.slot_of_tile = slot_of_tile_.data();
   set_region(p);
   p.isovalue = isovalue;
-  p.vertex_isovalue = static_cast<float>(isovalue);
   p.world = world_map(options_.transform, options_.inside);
   p.diagonal = is_diagonal(p.world);
   p.row_tables = row_tables_.data();
@@ -192,6 +189,11 @@ DeviceCounts ResidentLauncher::wait() {
     if (DeviceCounts counts; read_report(counts)) return counts;
     if (over) throw Error("the device ended an extraction without a report");
   }
+}
+
+bool ResidentLauncher::is_reported() const {
+  DeviceCounts counts;
+  return read_report(counts);
 }
 
 std::uint64_t ResidentLauncher::bytes() const {

@@ -4,7 +4,7 @@
 #include "gpu/resident/device_volume_impl.h"
 #include "gpu/tile/tile_kernel.h"
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 
 /// Where the mesh of a resident volume goes; what does not fit is not written.
 struct MeshRoom {
@@ -26,6 +26,9 @@ class ResidentLauncher {
   bool launch(double isovalue, const MeshRoom& room, const DeviceCounts& last);
   /// Waits for the report of the last launch, not for the end of the stream's work.
   DeviceCounts wait();
+
+  /// Whether wait() has nothing to wait for.
+  bool is_reported() const;
 
   /// Active tiles beyond this number are not begun.
   std::size_t tiles_with_room() const { return row_tables_.size(); }

@@ -4,14 +4,18 @@
 #include <cstdint>
 #include <memory>
 #include <span>
+#include <string>
 #include <vector>
 
+#include <isobrick/api.h>
 #include <isobrick/device.h>
+#include <isobrick/device_array.h>
+#include <isobrick/device_mesh.h>
 #include <isobrick/lattice.h>
 #include <isobrick/surface_options.h>
 #include <isobrick/surface_report.h>
 
-namespace isobrick::gpu {
+namespace isobrick::inline v0::gpu {
 
 /// Tiles of 32³ cells of a volume, by their place in units of 32 samples.
 struct DeviceTiles {
@@ -21,7 +25,7 @@ struct DeviceTiles {
 
 /// A volume in device memory, at its own width, as blocks of one tile each, with the ranges of the
 /// tiles. Not thread-safe.
-class DeviceVolume {
+class ISOBRICK_API DeviceVolume {
  public:
   /// Copies the whole volume to the current device. `bricks` must hold every brick that
   /// is not absent. Throws UsageError for a type that has no kernels, OutOfDeviceMemory when
@@ -31,6 +35,9 @@ class DeviceVolume {
   /// pass through twice `staging_bytes` of pinned memory, at least a block's. Throws as above.
   DeviceVolume(const Lattice& lattice, double fill_value, const DeviceTiles& tiles,
                std::size_t staging_bytes);
+  /// Copies an array of the current device in its stream, and waits until that is done. Strides are
+  /// given, multiples of a sample.
+  explicit DeviceVolume(const DeviceArray& array);
   ~DeviceVolume();
 
   /// Copies the samples of tiles, in the caller's TBB arena; `bricks` has those that they lie in.
@@ -38,6 +45,8 @@ class DeviceVolume {
 
   /// The samples and how they lie.
   const Lattice& lattice() const;
+  /// Whether a sample of an array is NaN; not known of bricks.
+  bool has_nan() const;
   /// Bytes of device memory that it holds.
   std::uint64_t bytes() const;
 
@@ -51,8 +60,8 @@ class DeviceVolume {
 
 /// The tiles that surfaces in `searched` look at, in Morton order. `reach` is 1 with normals or
 /// where samples may be NaN, else 0.
-std::vector<Int3> tiles_to_load(const Lattice& lattice, std::span<const Int3> searched,
-                                Index reach);
+ISOBRICK_API std::vector<Int3> tiles_to_load(const Lattice& lattice, std::span<const Int3> searched,
+                                             Index reach);
 
 struct LaunchShape;
 
@@ -73,7 +82,7 @@ struct DeviceCounts {
 /// Isosurfaces of a resident volume: search and extraction without leaving the
 /// device. Keeps its buffers from isovalue to isovalue. Those of one volume are for one thread at a
 /// time, but for write().
-class ResidentExtractor {
+class ISOBRICK_API ResidentExtractor {
  public:
   /// The isovalue of `options` does not matter. Takes at most `max_bytes` of device memory besides
   /// the volume's. Throws UsageError for what the device cannot do yet: dropping degenerate
@@ -85,6 +94,13 @@ class ResidentExtractor {
   /// The mesh of `isovalue`, in device memory until the next call. Grows the
   /// buffers and repeats when it does not fit them. OutOfDeviceMemory where it cannot.
   DeviceCounts extract(double isovalue);
+  /// The two halves of extract(): begin() waits for nothing, finish() for the size of the mesh.
+  void begin(double isovalue);
+  bool is_over() const;   ///< whether finish() has nothing to wait for
+  DeviceCounts finish();  ///< of the last begin()
+  /// The last mesh, with its memory; `unit` is that of its positions. The extractor takes as much
+  /// anew for the next one.
+  DeviceMesh take_mesh(const std::string& unit);
   /// Makes the last mesh once more, without waiting for it; for measuring, after an extract().
   void repeat();
   /// Milliseconds of the last repeat() on the stream, the search included; waits for it.

@@ -3,6 +3,7 @@
 // All of the library: open() and extract() first of all.
 
 #include <isobrick/convert.h>
+#include <isobrick/device_extractor.h>
 #include <isobrick/error.h>
 #include <isobrick/estimate.h>
 #include <isobrick/export.h>
@@ -24,7 +25,7 @@
 #include <isobrick/volume_extractor.h>
 #include <isobrick/volume_source.h>
 
-namespace isobrick {
+namespace isobrick::inline v0 {
 
 /// A surface of an opened volume in memory: extract() of its store.
 inline Mesh extract(const OpenedVolume& volume, const ExtractOptions& options,

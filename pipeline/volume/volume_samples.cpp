@@ -6,8 +6,7 @@
 
 #include <isobrick/error.h>
 
-namespace isobrick {
-namespace {
+namespace isobrick::inline v0 {
 
 void check_extent(Int3 extent) {
   if (!checked_volume(extent))
@@ -16,7 +15,6 @@ void check_extent(Int3 extent) {
                     extent.y, extent.z));
 }
 
-/// The strides as given, or those of samples without gaps.
 Int3 resolve_strides(Int3 strides, Int3 extent, Index bytes, const char* what) {
   if (strides == Int3{0, 0, 0}) return {bytes, bytes * extent.x, bytes * extent.x * extent.y};
   for (int axis = 0; axis < 3; ++axis)
@@ -24,8 +22,6 @@ Int3 resolve_strides(Int3 strides, Int3 extent, Index bytes, const char* what) {
       throw UsageError(fmt::format("the stride of the {} along {} is 0", what, "xyz"[axis]));
   return strides;
 }
-
-}  // namespace
 
 VolumeSamples::VolumeSamples(const Volume& volume) : transform(volume.transform) {
   check_extent(volume.extent);

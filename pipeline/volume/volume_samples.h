@@ -10,7 +10,13 @@
 #include "pipeline/volume/region_reader.h"
 #include "pipeline/volume/volume_ranges.h"
 
-namespace isobrick {
+namespace isobrick::inline v0 {
+
+/// Throws UsageError where it is not positive or overflows.
+void check_extent(Int3 extent);
+/// The strides as given, or those of samples without gaps where all are 0. Throws UsageError where
+/// one is; `what` they are of.
+Int3 resolve_strides(Int3 strides, Int3 extent, Index bytes, const char* what);
 
 /// A volume that is extracted without a store: where its samples are, and what is known of them.
 struct VolumeSamples {

@@ -41,8 +41,8 @@ const std::map<std::string, Names> kMayInclude = {
 /// The room that each public header belongs to.
 const std::map<std::string, Names> kPublicHeaders = {
     {"core",
-     {"downsampling", "error", "inside", "lattice", "pod_buffer", "progress", "range", "scalar",
-      "selection", "transform", "vec", "version"}},
+     {"api", "downsampling", "error", "inside", "lattice", "pod_buffer", "progress", "range",
+      "scalar", "selection", "transform", "vec", "version"}},
     {"io/volumes", {"array_view", "volume_request", "volume_source"}},
     {"io/volumes/open", {"open_source"}},
     {"io/volumes/synth", {"synth_source"}},
@@ -53,8 +53,8 @@ const std::map<std::string, Names> kPublicHeaders = {
     {"bricks/zarr", {"image_metadata", "level_info"}},
     {"index", {"index_kind"}},
     {"surface", {"mesh", "mesh_sinks", "surface_options", "surface_report"}},
-    {"gpu/memory", {"device"}},
-    {"gpu/resident", {"device_volume"}},
+    {"gpu/memory", {"device", "device_array"}},
+    {"gpu/resident", {"device_mesh", "device_volume"}},
     {"pipeline/cache", {"open_volume"}},
     {"pipeline/histogram", {"histogram", "isovalue"}},
     {"pipeline/convert", {"convert"}},
@@ -62,7 +62,7 @@ const std::map<std::string, Names> kPublicHeaders = {
     {"pipeline/extract", {"estimate", "extract", "index_choice"}},
     {"pipeline/index", {"index_build"}},
     {"pipeline/verify", {"verify"}},
-    {"pipeline/volume", {"volume", "volume_extractor"}},
+    {"pipeline/volume", {"device_extractor", "volume", "volume_extractor"}},
     {"isobrick", {"isobrick"}},
 };
 

@@ -97,6 +97,10 @@ T __ldg(const T* from) {
   return *from;
 }
 template <class T>
+T __ldcs(const T* from) {
+  return *from;
+}
+template <class T>
 void __stcs(T* to, std::type_identity_t<T> value) {
   *to = value;
 }

@@ -187,7 +187,7 @@ class StreamKernels : public ::testing::Test {
   }
 };
 
-TYPED_TEST_SUITE(StreamKernels, DeviceTypes);
+TYPED_TEST_SUITE(StreamKernels, KernelTypes);
 
 TYPED_TEST(StreamKernels, LaunchesOfAnyNumberOfTiles) {
   this->compare_waves({64, 64, 64}, 1);

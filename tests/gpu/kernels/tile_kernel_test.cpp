@@ -66,7 +66,7 @@ class TileKernel : public ::testing::Test {
   static constexpr double kMid = TestFields<T>::lowest() + 100;
 };
 
-TYPED_TEST_SUITE(TileKernel, DeviceTypes);
+TYPED_TEST_SUITE(TileKernel, KernelTypes);
 
 TYPED_TEST(TileKernel, RangesAndColumns) {
   for (const Int3 extent : {Int3{40, 35, 1}, Int3{33, 2, 67}}) {
@@ -182,6 +182,14 @@ TEST(TileKernelOf, NotANumber) {
   compare(with_nan(TestFields<float>::waves({67, 41, 40}), 1, 300), {}, {0, -40}, options);
   compare(with_nan(TestFields<float>::noise({40, 50, 34}, 1), 2, 20), {}, {0}, options);
   compare(with_nan(TestFields<float>::noise({33, 32, 34}, 5), 4, 3), {}, {0}, options);
+  compare(with_nan(TestFields<double>::noise({40, 50, 34}, 1), 2, 20), {}, {0}, options);
+}
+
+/// Samples that float cannot tell apart.
+TEST(TileKernelOf, WideSamplesAreInterpolatedInDouble) {
+  compare(wide_field<std::uint32_t>(), {}, {kWideIsovalue});
+  compare(wide_field<std::int32_t>(), {}, {kWideIsovalue});
+  compare(wide_field<double>(), {}, {kWideIsovalue, kWideIsovalue + 0.25});
 }
 
 }  // namespace

@@ -5,7 +5,7 @@
 #include <stdexcept>
 
 #include "core/threshold.h"
-#include "gpu/memory/device_scalar.h"
+#include "gpu/resident/pack_tiles.cuh"
 #include "gpu/search/search_tiles.cuh"
 #include "gpu/stream/unpack_tiles.cuh"
 #include "gpu/tile/extract_tiles.cuh"
@@ -24,16 +24,21 @@ struct Kernel {
   }
 };
 
+template <class T, class F>
+auto with_nan_kernel(const TileRun& r, F& f) {
+  return r.normals ? f(Kernel<384, T, true, true>()) : f(Kernel<384, T, false, true>());
+}
+
 template <class F>
 auto with_kernel(const TileRun& r, F&& f) {
   if (r.may_have_nan)
-    return r.normals ? f(Kernel<384, float, true, true>()) : f(Kernel<384, float, false, true>());
+    return r.type == ScalarType::f64 ? with_nan_kernel<double>(r, f) : with_nan_kernel<float>(r, f);
   switch (r.threads) {
     case 32: return f(Kernel<32, std::uint8_t, false, false>());
     case 640: return f(Kernel<640, std::uint8_t, false, false>());
     case 1024: return f(Kernel<1024, std::uint8_t, false, false>());
     case 384:
-      return gpu::visit_device_scalar(r.type, [&](auto tag) {
+      return visit_scalar(r.type, [&](auto tag) {
         using T = typename decltype(tag)::type;
         return r.normals ? f(Kernel<384, T, true, false>()) : f(Kernel<384, T, false, false>());
       });
@@ -49,7 +54,7 @@ void run_tiles(const TileRun& run, const gpu::TileParams& params, const gpu::Cas
 
 void run_search(ScalarType type, const gpu::SearchParams& params, unsigned seed) {
   const unsigned blocks = (params.count + gpu::kTilesOfSearchBlock - 1) / gpu::kTilesOfSearchBlock;
-  gpu::visit_device_scalar(type, [&](auto tag) {
+  visit_scalar(type, [&](auto tag) {
     using T = typename decltype(tag)::type;
     launch(blocks, gpu::kSearchThreads, 0, seed, [&] { gpu::search_tiles<T>(params); });
   });
@@ -57,7 +62,7 @@ void run_search(ScalarType type, const gpu::SearchParams& params, unsigned seed)
 
 void run_tile_ranges(ScalarType type, const gpu::TileParams& params, const std::int32_t* tiles,
                      std::uint32_t count, void* ranges) {
-  gpu::visit_device_scalar(type, [&](auto tag) {
+  visit_scalar(type, [&](auto tag) {
     using T = typename decltype(tag)::type;
     launch(count, gpu::kSearchThreads, 0, 1,
            [&] { gpu::find_tile_ranges<T>(params, tiles, static_cast<T*>(ranges)); });
@@ -66,7 +71,7 @@ void run_tile_ranges(ScalarType type, const gpu::TileParams& params, const std::
 
 void run_first_columns(ScalarType type, const void* tile_blocks, std::uint32_t count,
                        void* columns) {
-  gpu::visit_device_scalar(type, [&](auto tag) {
+  visit_scalar(type, [&](auto tag) {
     using T = typename decltype(tag)::type;
     launch(count, gpu::kSearchThreads, 0, 1, [&] {
       gpu::copy_first_columns<T>(static_cast<const T*>(tile_blocks), static_cast<T*>(columns));
@@ -74,8 +79,31 @@ void run_first_columns(ScalarType type, const void* tile_blocks, std::uint32_t c
   });
 }
 
+void run_pack(ScalarType type, const gpu::PackParams& p, unsigned seed) {
+  visit_scalar(type, [&](auto tag) {
+    using T = typename decltype(tag)::type;
+    const auto run = [&](auto&& kernel) { launch(p.count, gpu::kPackThreads, 0, seed, kernel); };
+    switch (gpu::pack_order(p, sizeof(T))) {
+      case gpu::PackOrder::vectors:
+        run([&] { gpu::pack_tiles<T, gpu::PackOrder::vectors>(p); });
+        break;
+      case gpu::PackOrder::along_x:
+        run([&] { gpu::pack_tiles<T, gpu::PackOrder::along_x>(p); });
+        break;
+      case gpu::PackOrder::along_y:
+        run([&] { gpu::pack_tiles<T, gpu::PackOrder::along_y>(p); });
+        break;
+      case gpu::PackOrder::along_z:
+        run([&] { gpu::pack_tiles<T, gpu::PackOrder::along_z>(p); });
+        break;
+    }
+    launch((p.count + gpu::kPackThreads - 1) / gpu::kPackThreads, gpu::kPackThreads, 0, seed,
+           [&] { gpu::join_part_ranges<T>(p); });
+  });
+}
+
 void run_unpack(ScalarType type, const gpu::UnpackParams& params, unsigned seed) {
-  gpu::visit_device_scalar(type, [&](auto tag) {
+  visit_scalar(type, [&](auto tag) {
     using T = typename decltype(tag)::type;
     launch(params.count, gpu::kUnpackThreads, 0, seed, [&] { gpu::unpack_tiles<T>(params); });
   });

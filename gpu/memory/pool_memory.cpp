@@ -1,0 +1,42 @@
+#include "gpu/memory/pool_memory.h"
+
+#include <limits>
+
+#include "gpu/memory/cuda_check.h"
+
+namespace isobrick::inline v0::gpu {
+namespace {
+
+class PoolMemory final : public DeviceMemory {
+ public:
+  PoolMemory() {
+    cudaMemPoolProps properties{};
+    properties.allocType = cudaMemAllocationTypePinned;
+    properties.location.type = cudaMemLocationTypeDevice;
+    check(cudaGetDevice(&properties.location.id));
+    check(cudaMemPoolCreate(&pool_, &properties));
+    std::uint64_t kept = std::numeric_limits<std::uint64_t>::max();
+    check(cudaMemPoolSetAttribute(pool_, cudaMemPoolAttrReleaseThreshold, &kept));
+  }
+  PoolMemory(const PoolMemory&) = delete;
+  PoolMemory& operator=(const PoolMemory&) = delete;
+  ~PoolMemory() override { (void)cudaMemPoolDestroy(pool_); }
+
+  void* allocate(std::size_t bytes, CUstream_st* stream) override {
+    void* memory = nullptr;
+    check(cudaMallocFromPoolAsync(&memory, bytes, pool_, stream));
+    return memory;
+  }
+  void free(void* memory, std::size_t, CUstream_st* stream) noexcept override {
+    (void)cudaFreeAsync(memory, stream);
+  }
+
+ private:
+  cudaMemPool_t pool_ = nullptr;
+};
+
+}  // namespace
+
+std::shared_ptr<DeviceMemory> pool_memory() { return std::make_shared<PoolMemory>(); }
+
+}  // namespace isobrick::gpu

@@ -1,0 +1,71 @@
+#include "gpu/resident/array_extractor.h"
+
+#include <fmt/format.h>
+
+#include "core/length_unit.h"
+#include "gpu/memory/cuda_check.h"
+#include "gpu/memory/device_scope.h"
+
+namespace isobrick::inline v0::gpu {
+namespace {
+
+int device_of(const void* samples) {
+  cudaPointerAttributes attributes{};
+  check(cudaPointerGetAttributes(&attributes, samples));
+  if (attributes.type != cudaMemoryTypeDevice && attributes.type != cudaMemoryTypeManaged)
+    throw UsageError("the samples are not in the memory of a CUDA device");
+  return attributes.device;
+}
+
+/// Whether one extractor makes both; they are of one volume.
+bool are_alike(const SurfaceOptions& a, const SurfaceOptions& b) {
+  return a.inside == b.inside && a.normals == b.normals && a.roi == b.roi;
+}
+
+}  // namespace
+
+ArrayExtractor::ArrayExtractor(const DeviceArray& array)
+    : device_(device_of(array.samples)), transform_(array.transform) {
+  const DeviceScope scope(device_);
+  volume_.emplace(array);
+}
+
+ArrayExtractor::~ArrayExtractor() {
+  const DeviceScope scope(device_);
+  extractor_.reset();
+  volume_.reset();
+}
+
+std::uint64_t ArrayExtractor::begin(SurfaceOptions options, std::uint64_t max_bytes) {
+  const DeviceScope scope(device_);
+  if (volume_->bytes() > max_bytes)
+    throw UsageError(fmt::format(
+        "--gpu-memory is too small: the copy of the samples takes {} bytes", volume_->bytes()));
+  options.transform = transform_;
+  options.may_have_nan = volume_->has_nan();
+  if (!extractor_ || max_bytes != max_bytes_ || !are_alike(options, options_)) {
+    extractor_.reset();
+    extractor_.emplace(*volume_, options, ResidentTuning{}, max_bytes - volume_->bytes());
+    options_ = options;
+    max_bytes_ = max_bytes;
+  }
+  is_finished_ = true;
+  extractor_->begin(options.isovalue);
+  is_finished_ = false;
+  return ++begun_;
+}
+
+bool ArrayExtractor::is_over(std::uint64_t number) const {
+  return number != begun_ || is_finished_ || extractor_->is_over();
+}
+
+DeviceMesh ArrayExtractor::finish(std::uint64_t number) {
+  if (number != begun_ || is_finished_)
+    throw UsageError("this mesh is taken already, or its extractor has begun another");
+  const DeviceScope scope(device_);
+  is_finished_ = true;
+  extractor_->finish();
+  return extractor_->take_mesh(unit_name(transform_.unit));
+}
+
+}  // namespace isobrick::gpu

@@ -1,0 +1,70 @@
+#pragma once
+
+#include <memory>
+
+#include <isobrick/api.h>
+#include <isobrick/device_array.h>
+#include <isobrick/device_mesh.h>
+#include <isobrick/extract.h>
+
+namespace isobrick::inline v0 {
+
+/// A mesh that a device is making.
+class ISOBRICK_API PendingDeviceMesh {
+ public:
+  struct Impl;  ///< private to the library
+
+  /// For the library itself.
+  explicit PendingDeviceMesh(std::unique_ptr<Impl> impl);
+  ~PendingDeviceMesh();
+  /// Takes the mesh of another.
+  PendingDeviceMesh(PendingDeviceMesh&&) noexcept;
+
+  /// Whether get() has nothing to wait for.
+  bool is_ready() const;
+  /// The mesh, once its size is known: the device may still be writing it (DeviceMesh::ready()). A
+  /// mesh that did not fit the memory which was taken for it is made again. Once. Throws UsageError
+  /// when the extractor has begun another, OutOfDeviceMemory, what went wrong on the device.
+  DeviceMesh get();
+
+ private:
+  std::unique_ptr<Impl> impl_;
+};
+
+/// Isosurfaces of an array in device memory, byte for byte those of VolumeExtractor. Samples and
+/// mesh stay on the device. Not thread-safe.
+///
+/// The constructor copies the samples to blocks of 32³ and finds their ranges, in one pass; the
+/// copy takes a little more memory than the samples. Each isovalue then reads only the blocks that
+/// it touches, and no longer the array.
+///
+/// Of ExtractOptions, `isovalue`, `roi`, `inside`, `normals` and `gpu_memory` matter; `inside` is
+/// above by default, `gpu_memory` without bound. The calling thread's current device is afterwards
+/// what it was before.
+class ISOBRICK_API DeviceExtractor {
+ public:
+  struct Impl;  ///< private to the library
+
+  /// Waits until the samples are copied. Throws UsageError for an array that makes no sense: no
+  /// samples or not of a device, an extent that is not positive, strides of which one is 0 or no
+  /// multiple of a sample; gpu::OutOfDeviceMemory; Error where there is no CUDA.
+  explicit DeviceExtractor(const DeviceArray& array);
+  ~DeviceExtractor();
+  /// Takes the samples of another.
+  DeviceExtractor(DeviceExtractor&&) noexcept;
+
+  /// Waits until the size of the mesh is known, not until it is written. Throws UsageError for
+  /// `drop_degenerate`, an isovalue that is not a number, a region without samples and for
+  /// `gpu_memory` that is too small; gpu::OutOfDeviceMemory.
+  DeviceMesh extract(const ExtractOptions& options);
+  /// Waits for nothing. The memory for the mesh is what the last one needed, some for the first.
+  PendingDeviceMesh extract_async(const ExtractOptions& options);
+
+ private:
+  std::shared_ptr<Impl> impl_;
+};
+
+/// A surface of an array in device memory in one go: DeviceExtractor.
+ISOBRICK_API DeviceMesh extract(const DeviceArray& array, const ExtractOptions& options);
+
+}  // namespace isobrick

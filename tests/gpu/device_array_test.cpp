@@ -1,0 +1,217 @@
+#include <cuda_runtime_api.h>
+#include <gtest/gtest.h>
+
+#include <atomic>
+
+#include <isobrick/device_volume.h>
+#include <isobrick/error.h>
+#include "gpu/memory/device_buffer.h"
+#include "gpu/resident/array_extractor.h"
+#include "tests/gpu/resident.h"
+#include "tests/gpu/strided_samples.h"
+
+// Meshes of arrays in device memory are those of the CPU, byte for byte.
+
+namespace isobrick::testing {
+namespace {
+
+using gpu::ArrayExtractor;
+using gpu::check;
+
+constexpr std::uint64_t kAnyMemory = ~std::uint64_t{0};
+
+/// An array in device memory.
+template <class T>
+struct ArrayOnDevice {
+  StridedSamples<T> samples;
+  gpu::DeviceBuffer<T> memory;
+  DeviceArray array;
+
+  ArrayOnDevice(const Field<T>& field, const SampleLayout& layout = kSampleLayouts[0])
+      : samples(field, layout), memory(samples.memory.size()) {
+    check(cudaMemcpy(memory.data(), samples.memory.data(), memory.bytes(), cudaMemcpyHostToDevice));
+    array = DeviceArray::of(memory.data() + samples.first, field.extent);
+    array.strides = samples.strides;
+  }
+};
+
+SurfaceOptions surface(double isovalue, Int3 extent, bool normals = false) {
+  SurfaceOptions options;
+  options.isovalue = isovalue;
+  options.roi = {{0, 0, 0}, extent};
+  options.normals = normals;
+  return options;
+}
+
+DeviceMesh extract(ArrayExtractor& extractor, const SurfaceOptions& options,
+                   std::uint64_t max_bytes = kAnyMemory) {
+  return extractor.finish(extractor.begin(options, max_bytes));
+}
+
+template <class T>
+isobrick::Mesh expected_mesh(const Field<T>& field, SurfaceOptions options) {
+  const Lattice lattice{field.extent, {64, 64, 64}, scalar_type_of<T>};
+  options.may_have_nan = std::is_floating_point_v<T>;
+  return on_cpu(field, lattice, DenseBricks(lattice, field.samples.data()), options);
+}
+
+template <class T>
+class GpuArray : public DeviceTest<T> {};
+
+TYPED_TEST_SUITE(GpuArray, DeviceTypes);
+
+TYPED_TEST(GpuArray, OfAnyLayoutIsTheMeshOfTheCpu) {
+  const double mid = this->lowest() + 100;
+  const auto field = this->noise({67, 41, 75}, 1);
+  for (const SampleLayout& layout : kSampleLayouts) {
+    SCOPED_TRACE(layout.name);
+    const ArrayOnDevice<TypeParam> on_device(field, layout);
+    ArrayExtractor extractor(on_device.array);
+    for (const bool normals : {false, true})
+      for (const double isovalue : {mid, mid + 0.5, mid - 90}) {
+        const SurfaceOptions options = surface(isovalue, field.extent, normals);
+        expect_same(expected_mesh(field, options), extract(extractor, options).download());
+      }
+  }
+}
+
+TYPED_TEST(GpuArray, OfAnyExtentIsTheMeshOfTheCpu) {
+  for (const Int3 extent : {Int3{1, 1, 1}, Int3{2, 2, 2}, Int3{32, 33, 64}, Int3{131, 70, 97}}) {
+    const auto field = this->waves(extent);
+    const ArrayOnDevice<TypeParam> on_device(field);
+    ArrayExtractor extractor(on_device.array);
+    const SurfaceOptions options = surface(this->lowest() + 100.5, extent, true);
+    expect_same(expected_mesh(field, options), extract(extractor, options).download());
+  }
+}
+
+class GpuArrayOf : public DeviceTest<float> {};
+
+TEST_F(GpuArrayOf, NaNIsTheMeshOfTheCpu) {
+  const auto field = with_nan(noise({67, 41, 75}, 2), 3, 20);
+  const ArrayOnDevice<float> on_device(field, kSampleLayouts[4]);
+  ArrayExtractor extractor(on_device.array);
+  const SurfaceOptions options = surface(0, field.extent, true);
+  expect_same(expected_mesh(field, options), extract(extractor, options).download());
+}
+
+/// Samples that are written in a stream of the caller's, just before.
+TEST_F(GpuArrayOf, AStreamOfTheCallersOrdersAll) {
+  const auto field = waves({131, 70, 97});
+  const SurfaceOptions options = surface(0, field.extent);
+  gpu::Stream stream;
+  const ArrayOnDevice<float> from(field);
+  const gpu::DeviceBuffer<float> to(from.memory.size());
+  check(cudaMemset(to.data(), 0, to.bytes()));
+  check(cudaMemcpyAsync(to.data(), from.memory.data(), to.bytes(), cudaMemcpyDeviceToDevice,
+                        stream.get()));
+  DeviceArray array = DeviceArray::of(static_cast<const float*>(to.data()), field.extent);
+  array.strides = from.array.strides;
+  array.stream = stream.get();
+  ArrayExtractor extractor(array);
+  // The copy of the samples is made: the array is of no matter any more.
+  check(cudaMemsetAsync(to.data(), 0, to.bytes(), stream.get()));
+  const DeviceMesh mesh = extract(extractor, options);
+  EXPECT_EQ(mesh.stream(), stream.get());
+  gpu::Stream other;
+  mesh.precede(other.get());
+  std::vector<Vec3f> positions(mesh.positions().size());
+  check(cudaMemcpyAsync(positions.data(), mesh.positions().data(), mesh.positions().size_bytes(),
+                        cudaMemcpyDeviceToHost, other.get()));
+  other.wait();
+  const isobrick::Mesh expected = expected_mesh(field, options);
+  ASSERT_EQ(positions.size(), expected.positions.size());
+  EXPECT_EQ(
+      std::memcmp(positions.data(), expected.positions.data(), positions.size() * sizeof(Vec3f)),
+      0);
+  expect_same(expected, mesh.download());
+}
+
+/// Counts what it gives.
+class CountingMemory final : public DeviceMemory {
+ public:
+  std::atomic<std::int64_t> held = 0, calls = 0;
+
+  void* allocate(std::size_t bytes, CUstream_st* stream) override {
+    void* memory = nullptr;
+    check(cudaMallocAsync(&memory, bytes, stream));
+    held += static_cast<std::int64_t>(bytes);
+    ++calls;
+    return memory;
+  }
+  void free(void* memory, std::size_t bytes, CUstream_st* stream) noexcept override {
+    held -= static_cast<std::int64_t>(bytes);
+    (void)cudaFreeAsync(memory, stream);
+  }
+};
+
+TEST_F(GpuArrayOf, MemoryOfTheCallersIsAllThatIsTaken) {
+  const auto field = waves({131, 70, 97});
+  const ArrayOnDevice<float> on_device(field);
+  const auto memory = std::make_shared<CountingMemory>();
+  DeviceArray array = on_device.array;
+  array.memory = memory;
+  DeviceMesh mesh;
+  {
+    ArrayExtractor extractor(array);
+    EXPECT_GT(memory->held, static_cast<std::int64_t>(field.samples.size() * sizeof(float)));
+    mesh = extract(extractor, surface(0, field.extent));
+    // Later meshes take their memory once.
+    const DeviceMesh second = extract(extractor, surface(5, field.extent));
+    const std::int64_t calls = memory->calls;
+    const DeviceMesh third = extract(extractor, surface(5, field.extent));
+    EXPECT_EQ(memory->calls, calls + 2);
+  }
+  expect_same(expected_mesh(field, surface(0, field.extent)), mesh.download());
+  EXPECT_GE(memory->held, static_cast<std::int64_t>(mesh.positions().size_bytes() +
+                                                    mesh.triangles().size_bytes()));
+  mesh = {};
+  EXPECT_EQ(memory->held, 0);
+}
+
+TEST_F(GpuArrayOf, PendingMeshes) {
+  const auto field = waves({131, 70, 97});
+  const ArrayOnDevice<float> on_device(field);
+  ArrayExtractor extractor(on_device.array);
+  const SurfaceOptions first = surface(0, field.extent), second = surface(20, field.extent);
+  const std::uint64_t superseded = extractor.begin(first, kAnyMemory);
+  const std::uint64_t number = extractor.begin(second, kAnyMemory);
+  EXPECT_TRUE(extractor.is_over(superseded));
+  EXPECT_THROW(extractor.finish(superseded), UsageError);
+  while (!extractor.is_over(number)) {
+  }
+  expect_same(expected_mesh(field, second), extractor.finish(number).download());
+  EXPECT_THROW(extractor.finish(number), UsageError);
+}
+
+TEST_F(GpuArrayOf, MeshesOutliveTheirExtractorAndOneAnother) {
+  const auto field = waves({131, 70, 97});
+  std::vector<DeviceMesh> meshes;
+  {
+    const ArrayOnDevice<float> on_device(field);
+    ArrayExtractor extractor(on_device.array);
+    for (const double isovalue : {0.0, 30.0, -20.0, 1e9})
+      meshes.push_back(extract(extractor, surface(isovalue, field.extent)));
+  }
+  EXPECT_EQ(meshes[3].device(), -1);
+  EXPECT_EQ(meshes[3].download().triangles.size(), 0u);
+  expect_same(expected_mesh(field, surface(30, field.extent)), meshes[1].download());
+  expect_same(expected_mesh(field, surface(0, field.extent)), meshes[0].download());
+}
+
+TEST_F(GpuArrayOf, WhatMakesNoSenseIsRefused) {
+  const auto field = waves({40, 40, 40});
+  EXPECT_THROW(ArrayExtractor(DeviceArray::of(field.samples.data(), field.extent)), UsageError);
+  const ArrayOnDevice<float> on_device(field);
+  ArrayExtractor extractor(on_device.array);
+  SurfaceOptions dropping = surface(0, field.extent);
+  dropping.drop_degenerate = true;
+  EXPECT_THROW(extract(extractor, dropping), UsageError);
+  EXPECT_THROW(extract(extractor, surface(std::nan(""), field.extent)), UsageError);
+  EXPECT_THROW(extract(extractor, surface(0, field.extent), 1 << 16), UsageError);
+  expect_same(expected_mesh(field, surface(0, field.extent)),
+              extract(extractor, surface(0, field.extent)).download());
+}
+
+}  // namespace
+}  // namespace isobrick::testing
