@@ -16,6 +16,7 @@ origin, direction, vertices, normals) is x, y, z, as in VTK, SimpleITK and nibab
 Long operations take `progress=`, leave the GIL to other threads, and end within a second of Ctrl-C.
 """
 
+from ._device import DeviceMesh, DeviceRows
 from ._errors import DamageError, Error, UsageError
 from ._extract import Extractor, extract
 from ._isobrick import __version__
@@ -26,6 +27,8 @@ from ._volume import Histogram, Level, Volume, open
 
 __all__ = [
     "DamageError",
+    "DeviceMesh",
+    "DeviceRows",
     "Error",
     "Extractor",
     "Histogram",

@@ -45,6 +45,34 @@ class Mesh:
     def to_pyvista(self) -> Any: ...
     def to_meshio(self) -> Any: ...
 
+class DeviceRows:
+    shape: tuple[int, int]
+    dtype: np.dtype[Any]
+    def __len__(self) -> int: ...
+    @property
+    def __cuda_array_interface__(self) -> dict[str, Any]: ...
+    def __dlpack_device__(self) -> tuple[int, int]: ...
+    def __dlpack__(
+        self,
+        *,
+        stream: Optional[int] = None,
+        max_version: Optional[tuple[int, int]] = None,
+        dl_device: Optional[tuple[int, int]] = None,
+        copy: Optional[bool] = None,
+    ) -> Any: ...
+
+class DeviceMesh:
+    @property
+    def vertices(self) -> DeviceRows: ...
+    @property
+    def normals(self) -> Optional[DeviceRows]: ...
+    @property
+    def faces(self) -> DeviceRows: ...
+    @property
+    def device(self) -> int: ...
+    def __len__(self) -> int: ...
+    def to_host(self) -> Mesh: ...
+
 class Extractor:
     def __init__(
         self,
@@ -56,6 +84,7 @@ class Extractor:
         unit: Optional[str] = None,
         mask: Optional[ArrayLike] = None,
         nodata: Optional[float] = None,
+        stream: Any = None,
     ) -> None: ...
     @property
     def shape(self) -> tuple[int, int, int]: ...
@@ -74,7 +103,7 @@ class Extractor:
         memory: _Bytes = ...,
         threads: int = 0,
         progress: _Progress = None,
-    ) -> Mesh: ...
+    ) -> Union[Mesh, DeviceMesh]: ...
     def save(
         self,
         path: _Path,
@@ -101,6 +130,7 @@ def extract(
     unit: Optional[str] = None,
     mask: Optional[ArrayLike] = None,
     nodata: Optional[float] = None,
+    stream: Any = None,
     roi: _Roi = None,
     normals: bool = False,
     inside: _Inside = "above",
@@ -108,7 +138,7 @@ def extract(
     memory: _Bytes = ...,
     threads: int = 0,
     progress: _Progress = None,
-) -> Mesh: ...
+) -> Union[Mesh, DeviceMesh]: ...
 def marching_cubes(
     volume: np.ndarray[Any, Any],
     level: Optional[float] = None,

@@ -1,6 +1,7 @@
 """Surfaces of arrays."""
 
 from ._arguments import box_of, extract_options, mesh_file_options, number, path_text
+from ._device import DeviceMesh, DeviceSamples, is_on_device
 from ._errors import UsageError
 from ._mesh import Mesh
 from ._progress import reporting
@@ -20,6 +21,8 @@ class Extractor:
         array is read in place, whatever its strides, and must stay as it is while it is used.
         Anything else with `shape`, `dtype` and `__getitem__` (dask, zarr, h5py) is read by blocks,
         never as a whole. A `xarray.DataArray` gives spacing, origin and unit by its coordinates.
+        An array in the memory of a CUDA device (PyTorch, CuPy, JAX, Numba) stays there: its
+        surfaces are a `DeviceMesh`. Its samples are copied once, within the device.
     spacing, origin : three floats x, y, z, optional
         Distance between samples, and the place of sample [0, 0, 0], in world space.
     direction : 3×3 floats, optional
@@ -30,14 +33,27 @@ class Extractor:
         Where it is False the sample is missing. No surface touches missing samples.
     nodata : float, optional
         Samples of this value are missing.
+    stream : CUDA stream or its number, optional
+        Of an array in device memory: what orders the work after that which makes the samples. By
+        default the one that the array names, else the default stream.
 
     Arrays and all that indexes them (`shape`, `roi`) are in the order z, y, x. World space
     (`spacing`, `origin`, vertices) is in the order x, y, z, as in VTK, SimpleITK and nibabel.
     """
 
     def __init__(
-        self, array, *, spacing=None, origin=None, direction=None, unit=None, mask=None, nodata=None
+        self, array, *, spacing=None, origin=None, direction=None, unit=None, mask=None,
+        nodata=None, stream=None,
     ):
+        if is_on_device(array):
+            self._samples = DeviceSamples(
+                array, spacing=spacing, origin=origin, direction=direction, unit=unit, mask=mask,
+                nodata=nodata, stream=stream,
+            )
+            self._native = self._samples.native
+            return
+        if stream is not None:
+            raise UsageError("stream is for arrays in the memory of a CUDA device")
         samples = Samples(
             array, spacing=spacing, origin=origin, direction=direction, unit=unit, mask=mask
         )
@@ -57,14 +73,21 @@ class Extractor:
 
     @property
     def range(self):
-        """(smallest, largest) sample, missing ones left out; None before the first extraction."""
-        return self._native.range
+        """(smallest, largest) sample, missing ones left out.
+
+        None before the first extraction, and of arrays in device memory.
+        """
+        return None if self._on_device else self._native.range
+
+    @property
+    def _on_device(self):
+        return isinstance(self._samples, DeviceSamples)
 
     def extract(
         self, isovalue, *, roi=None, normals=False, inside="above", drop_degenerate=False,
         memory=2**30, threads=0, progress=None,
     ):
-        """The surface of an isovalue as a `Mesh`.
+        """The surface of an isovalue as a `Mesh`, or a `DeviceMesh` of an array on a device.
 
         Parameters
         ----------
@@ -77,9 +100,10 @@ class Extractor:
         inside : "above" or "below"
             Which samples are inside: those of at least the isovalue, or those less than it.
         drop_degenerate : bool
-            Leaves triangles without area out.
+            Leaves triangles without area out; not on a device.
         memory : int or str
-            Budget in bytes, or a text such as "512M", for all but the array and the mesh.
+            Budget in bytes, or a text such as "512M", for all but the array and the mesh. It does
+            not bound device memory.
         threads : int
             0: all cores.
         progress : function or tqdm, optional
@@ -90,6 +114,8 @@ class Extractor:
         options = self._options(
             isovalue, roi, normals, inside, drop_degenerate, memory, threads
         )
+        if self._on_device:
+            return DeviceMesh(self._native.extract(options))
         with reporting(progress) as report:
             return Mesh._of(self._native.extract(options, report))
 
@@ -106,6 +132,8 @@ class Extractor:
             isovalue, roi, normals, inside, drop_degenerate, memory, threads
         )
         file = mesh_file_options(force=force, quantize=quantize, threads=threads, memory=memory)
+        if self._on_device:
+            raise UsageError("of an array in device memory, save extract(…).to_host()")
         with reporting(progress) as report:
             return self._native.save(options, path_text(path), file, report)
 
@@ -119,20 +147,21 @@ class Extractor:
             isovalue, box=box_of(roi, self.shape), normals=normals, inside=inside,
             drop_degenerate=drop_degenerate, memory=memory, threads=threads,
         )
-        options.memory_of_others = self._samples.set_memory(options.memory)
+        if not self._on_device:
+            options.memory_of_others = self._samples.set_memory(options.memory)
         return options
 
 
 def extract(
     array, isovalue, *, spacing=None, origin=None, direction=None, unit=None, mask=None,
-    nodata=None, roi=None, normals=False, inside="above", drop_degenerate=False, memory=2**30,
-    threads=0, progress=None,
+    nodata=None, stream=None, roi=None, normals=False, inside="above", drop_degenerate=False,
+    memory=2**30, threads=0, progress=None,
 ):
-    """The isosurface of an array [z, y, x] as a `Mesh`.
+    """The isosurface of an array [z, y, x] as a `Mesh`, or a `DeviceMesh` of one on a device.
 
     Parameters
     ----------
-    array, spacing, origin, direction, unit, mask, nodata
+    array, spacing, origin, direction, unit, mask, nodata, stream
         As of `Extractor`: arrays are indexed [z, y, x]; world space is x, y, z.
     isovalue, roi, normals, inside, drop_degenerate, memory, threads, progress
         As of `Extractor.extract`.
@@ -147,7 +176,7 @@ def extract(
     """
     extractor = Extractor(
         array, spacing=spacing, origin=origin, direction=direction, unit=unit, mask=mask,
-        nodata=nodata,
+        nodata=nodata, stream=stream,
     )
     return extractor.extract(
         isovalue, roi=roi, normals=normals, inside=inside, drop_degenerate=drop_degenerate,

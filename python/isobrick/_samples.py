@@ -4,6 +4,7 @@ import numpy as np
 
 from . import _isobrick
 from ._arguments import transform
+from ._device import is_on_device
 from ._errors import UsageError
 from ._blocks import BlockReader
 
@@ -124,12 +125,11 @@ def _in_memory_or_lazy(array):
     """A NumPy array without a copy where there is memory, else what can be read by blocks."""
     if isinstance(array, np.ndarray):
         return array
+    if is_on_device(array):
+        raise TypeError(
+            f"array ({type(array).__name__}) is in the memory of a device; copy it to the host"
+        )
     if hasattr(array, "__dlpack_device__"):
-        device, _ = array.__dlpack_device__()
-        if device != 1:
-            raise TypeError(
-                f"array ({type(array).__name__}) is in the memory of a device; copy it to the host"
-            )
         return np.from_dlpack(array)
     is_lazy = all(hasattr(array, name) for name in ("shape", "dtype", "__getitem__"))
     if is_lazy and not hasattr(array, "__array_interface__"):

@@ -8,6 +8,7 @@ namespace isobrick::python {
 void bind_errors();
 void bind_options(pybind11::module_& module);
 void bind_mesh(pybind11::module_& module);
+void bind_device(pybind11::module_& module);
 void bind_extractor(pybind11::module_& module);
 void bind_store(pybind11::module_& module);
 void bind_operations(pybind11::module_& module);

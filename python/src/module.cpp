@@ -9,6 +9,7 @@ PYBIND11_MODULE(_isobrick, module) {
   bind_errors();
   bind_options(module);
   bind_mesh(module);
+  bind_device(module);
   bind_extractor(module);
   bind_store(module);
   bind_operations(module);

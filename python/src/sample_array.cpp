@@ -17,17 +17,6 @@ namespace {
 
 namespace py = pybind11;
 
-/// The byte order, 'u', 'i' or 'f', and bytes.
-std::optional<ScalarType> type_of(char order, char kind, py::ssize_t bytes) {
-  constexpr char other = std::endian::native == std::endian::little ? '>' : '<';
-  if (order == other) return std::nullopt;
-  for (const ScalarType type : kScalarTypes) {
-    const char* name = zarr_name(type).data();
-    if (name[0] == kind && size_of(type) == static_cast<std::size_t>(bytes)) return type;
-  }
-  return std::nullopt;
-}
-
 /// Calls a Python function with the bounds of a box, which returns its samples.
 class PythonReader {
  public:
@@ -52,10 +41,20 @@ class PythonReader {
 
 }  // namespace
 
+std::optional<ScalarType> scalar_type(char kind, py::ssize_t bytes) {
+  if (kind == 'b') kind = 'u';
+  for (const ScalarType type : kScalarTypes) {
+    const char* name = zarr_name(type).data();
+    if (name[0] == kind && size_of(type) == static_cast<std::size_t>(bytes)) return type;
+  }
+  return std::nullopt;
+}
+
 std::optional<ScalarType> scalar_type(const py::array& array) {
+  constexpr char other = std::endian::native == std::endian::little ? '>' : '<';
   const py::dtype type = array.dtype();
   const char order = py::cast<std::string>(type.attr("byteorder")).front();
-  return type_of(order, type.kind() == 'b' ? 'u' : type.kind(), type.itemsize());
+  return order == other ? std::nullopt : scalar_type(type.kind(), type.itemsize());
 }
 
 Volume volume_of(const py::array& array, ScalarType type) {

@@ -13,6 +13,9 @@ namespace isobrick::python {
 /// order than this machine's.
 std::optional<ScalarType> scalar_type(const pybind11::array& array);
 
+/// The same of a kind ('u', 'i', 'f' or 'b') and bytes a sample, in native byte order.
+std::optional<ScalarType> scalar_type(char kind, pybind11::ssize_t bytes);
+
 /// The samples of an array [z, y, x] where they lie; the array must outlive the volume. Throws
 /// UsageError for an array that is no volume.
 Volume volume_of(const pybind11::array& array);

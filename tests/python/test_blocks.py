@@ -162,7 +162,7 @@ class Exchanged:
 def test_memory_of_other_libraries_is_read_in_place():
     field = ball()
     assert same(isobrick.extract(Exchanged(field), 1), isobrick.extract(field, 1))
-    with pytest.raises(TypeError, match="device"):
+    with pytest.raises(ValueError, match="device"):
         isobrick.extract(Exchanged(field, device=2), 1)
 
 

@@ -1,0 +1,180 @@
+"""Arrays in the memory of a CUDA device, of the libraries that are there."""
+
+import numpy as np
+import pytest
+
+import isobrick
+
+
+def ball(shape=(50, 40, 45), dtype=np.float32):
+    z, y, x = np.indices(shape)
+    return (np.hypot(np.hypot(z - 20.0, y - 19.0), x - 22.0) * 5).astype(dtype)
+
+
+def _torch():
+    torch = pytest.importorskip("torch")
+    if not torch.cuda.is_available():
+        pytest.skip("no CUDA device")
+    return (
+        lambda array: torch.from_numpy(array.copy()).cuda(),
+        lambda rows: torch.as_tensor(rows).cpu().numpy(),
+        lambda rows: torch.from_dlpack(rows).cpu().numpy(),
+    )
+
+
+def _cupy():
+    cupy = pytest.importorskip("cupy")
+    try:
+        cupy.cuda.runtime.getDeviceCount()
+    except cupy.cuda.runtime.CUDARuntimeError:
+        pytest.skip("no CUDA device")
+    return (
+        cupy.asarray,
+        lambda rows: cupy.asnumpy(cupy.asarray(rows)),
+        lambda rows: cupy.asnumpy(cupy.from_dlpack(rows)),
+    )
+
+
+def _numba():
+    cuda = pytest.importorskip("numba.cuda")
+    if not cuda.is_available():
+        pytest.skip("no CUDA device")
+    copy = lambda rows: cuda.as_cuda_array(rows).copy_to_host()
+    return cuda.to_device, copy, copy
+
+
+@pytest.fixture(params=[_torch, _cupy, _numba], ids=["torch", "cupy", "numba"])
+def library(request):
+    """A function that copies to the device, and two that read rows of a mesh."""
+    return request.param()
+
+
+def expect_same(mesh, field, isovalue, **options):
+    host = isobrick.extract(field, isovalue, **options)
+    back = mesh.to_host()
+    assert np.array_equal(back.vertices, host.vertices)
+    assert np.array_equal(back.faces, host.faces)
+    assert back.unit == host.unit
+    return host
+
+
+@pytest.mark.parametrize("dtype", ["uint8", "int16", "int32", "float32", "float64"])
+def test_meshes_are_those_of_the_host(library, dtype):
+    to_device, by_interface, by_dlpack = library
+    field = ball(dtype=dtype)
+    extractor = isobrick.Extractor(to_device(field), spacing=(1, 2, 3), unit="mm")
+    assert extractor.shape == field.shape and extractor.dtype == field.dtype
+    for isovalue in (20.5, 60):
+        mesh = extractor.extract(isovalue, normals=True)
+        host = expect_same(mesh, field, isovalue, spacing=(1, 2, 3), unit="mm", normals=True)
+        for read in (by_interface, by_dlpack):
+            assert np.array_equal(read(mesh.vertices), host.vertices)
+            assert np.array_equal(read(mesh.normals), host.normals)
+            assert np.array_equal(read(mesh.faces).view("uint32"), host.faces)
+
+
+def test_arrays_of_any_strides(library):
+    to_device = library[0]
+    field = ball()
+    on_device = to_device(field)
+    for take in (
+        lambda a: a[::2, :, ::3],
+        lambda a: a.transpose(2, 1, 0) if isinstance(a, np.ndarray) or hasattr(a, "get")
+        else a.permute(2, 1, 0) if hasattr(a, "permute") else a.T,
+        lambda a: a[3:, 4:, 1:],
+    ):
+        expect_same(isobrick.extract(take(on_device), 40), take(field), 40)
+
+
+def test_parts_and_missing_samples(library):
+    to_device = library[0]
+    field = ball()
+    field[10:12, 20, 20] = np.nan
+    mesh = isobrick.extract(to_device(field), 40, roi=np.s_[2:30, :, 5:], inside="below")
+    expect_same(mesh, field, 40, roi=np.s_[2:30, :, 5:], inside="below")
+
+
+def test_rows_outlive_mesh_and_array(library):
+    to_device, by_interface, _ = library
+    field = ball()
+    vertices = isobrick.extract(to_device(field), 40).vertices
+    for _ in range(3):
+        isobrick.extract(to_device(field + 50), 90)
+    assert np.array_equal(by_interface(vertices), isobrick.extract(field, 40).vertices)
+
+
+def test_a_surface_without_triangles(library):
+    mesh = isobrick.extract(library[0](ball()), 1e6)
+    assert len(mesh) == 0 and mesh.vertices.shape == (0, 3)
+    assert len(mesh.to_host()) == 0
+
+
+def test_a_stream_of_torch():
+    torch = pytest.importorskip("torch")
+    if not torch.cuda.is_available():
+        pytest.skip("no CUDA device")
+    field = ball((200, 200, 200))
+    host = isobrick.extract(field, 70)
+    source = torch.from_numpy(field).pin_memory()
+    stream = torch.cuda.Stream()
+    with torch.cuda.stream(stream):
+        array = torch.zeros(field.shape, device="cuda")
+        array.copy_(source, non_blocking=True)
+        mesh = isobrick.extract(array, 70, stream=stream)
+        vertices = torch.from_dlpack(mesh.vertices)
+        total = vertices.double().sum()
+    stream.synchronize()
+    assert np.isclose(float(total), host.vertices.astype(float).sum())
+
+
+def test_jax():
+    jax = pytest.importorskip("jax")
+    if not any(device.platform == "gpu" for device in jax.devices()):
+        pytest.skip("no CUDA device")
+    field = ball()
+    mesh = isobrick.extract(jax.numpy.asarray(field), 40)
+    host = expect_same(mesh, field, 40)
+    assert np.array_equal(np.asarray(jax.numpy.from_dlpack(mesh.vertices)), host.vertices)
+
+
+class Described:
+    """An array that says that it is in device memory."""
+
+    def __init__(self, array, **changes):
+        self.array = array
+        self.__cuda_array_interface__ = {
+            "shape": array.shape,
+            "typestr": array.dtype.str,
+            "data": (array.ctypes.data, False),
+            "strides": array.strides,
+            "version": 3,
+            **changes,
+        }
+
+
+def refused(error, text, array, **options):
+    with pytest.raises(error, match=text) as caught:
+        isobrick.extract(array, 1, **options)
+    assert "\n" not in str(caught.value)
+
+
+def test_what_makes_no_sense_is_refused():
+    field = ball()
+    refused(ValueError, "three axes", Described(field[0]))
+    refused(ValueError, "byte order", Described(field, typestr=">f4"))
+    refused(ValueError, "not supported", Described(field, typestr="<f2"))
+    refused(ValueError, "not supported", Described(field, typestr="<c8"))
+    refused(ValueError, "mask", Described(field, mask=np.ones(field.shape, bool)))
+    refused(ValueError, "nodata", Described(field), nodata=3)
+    refused(ValueError, "none, or more", Described(field, shape=(0, 4, 4)))
+    refused(ValueError, "no samples", Described(field, data=(0, False)))
+    refused(ValueError, "multiple", Described(field, strides=(7201, 180, 4)))
+    refused(ValueError, "stride", Described(field, strides=(7200, 0, 4)))
+    refused(TypeError, "stream", Described(field), stream="first")
+    refused(ValueError, "stream", field, stream=1)
+    with pytest.raises(TypeError, match="copy it to the host"):
+        isobrick.convert(Described(field), "unused.zarr")
+
+
+def test_host_memory_is_no_device_memory():
+    refused(isobrick.Error, "CUDA", Described(ball()))
