@@ -28,4 +28,6 @@ set_target_properties(isobrick_isobrick PROPERTIES
 target_include_directories(isobrick_isobrick INTERFACE
   $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/include> $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
 target_compile_features(isobrick_isobrick INTERFACE cxx_std_20)
-target_link_options(isobrick_isobrick PRIVATE LINKER:--exclude-libs,ALL LINKER:--no-undefined)
+set(isobrick_map ${PROJECT_SOURCE_DIR}/cmake/isobrick.map)
+target_link_options(isobrick_isobrick PRIVATE LINKER:--version-script=${isobrick_map} LINKER:--no-undefined)
+set_target_properties(isobrick_isobrick PROPERTIES LINK_DEPENDS ${isobrick_map})

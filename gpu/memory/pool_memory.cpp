@@ -1,6 +1,8 @@
 #include "gpu/memory/pool_memory.h"
 
 #include <limits>
+#include <map>
+#include <mutex>
 
 #include "gpu/memory/cuda_check.h"
 
@@ -9,11 +11,11 @@ namespace {
 
 class PoolMemory final : public DeviceMemory {
  public:
-  PoolMemory() {
+  explicit PoolMemory(int device) {
     cudaMemPoolProps properties{};
     properties.allocType = cudaMemAllocationTypePinned;
     properties.location.type = cudaMemLocationTypeDevice;
-    check(cudaGetDevice(&properties.location.id));
+    properties.location.id = device;
     check(cudaMemPoolCreate(&pool_, &properties));
     std::uint64_t kept = std::numeric_limits<std::uint64_t>::max();
     check(cudaMemPoolSetAttribute(pool_, cudaMemPoolAttrReleaseThreshold, &kept));
@@ -37,6 +39,15 @@ class PoolMemory final : public DeviceMemory {
 
 }  // namespace
 
-std::shared_ptr<DeviceMemory> pool_memory() { return std::make_shared<PoolMemory>(); }
+std::shared_ptr<DeviceMemory> pool_memory() {
+  static std::mutex mutex;
+  static std::map<int, std::weak_ptr<DeviceMemory>> pools;
+  int device = 0;
+  check(cudaGetDevice(&device));
+  const std::lock_guard lock(mutex);
+  std::shared_ptr<DeviceMemory> pool = pools[device].lock();
+  if (!pool) pools[device] = pool = std::make_shared<PoolMemory>(device);
+  return pool;
+}
 
 }  // namespace isobrick::gpu

@@ -6,9 +6,9 @@
 
 namespace isobrick::inline v0::gpu {
 
-/// A pool of the current device's memory that keeps what is given back until it is destroyed: the
-/// device's own pool returns it to the driver whenever a stream is waited for, which takes
-/// milliseconds a gigabyte.
+/// A pool of the current device's memory that all share who hold it, and that keeps what is given
+/// back: the device's own pool returns it to the driver whenever a stream is waited for, which
+/// takes milliseconds a gigabyte.
 std::shared_ptr<DeviceMemory> pool_memory();
 
 }  // namespace isobrick::gpu

@@ -39,8 +39,8 @@ ArrayExtractor::~ArrayExtractor() {
 std::uint64_t ArrayExtractor::begin(SurfaceOptions options, std::uint64_t max_bytes) {
   const DeviceScope scope(device_);
   if (volume_->bytes() > max_bytes)
-    throw UsageError(fmt::format(
-        "--gpu-memory is too small: the copy of the samples takes {} bytes", volume_->bytes()));
+    throw UsageError(
+        fmt::format("--gpu-memory is too small: the ranges alone take {} bytes", volume_->bytes()));
   options.transform = transform_;
   options.may_have_nan = volume_->has_nan();
   if (!extractor_ || max_bytes != max_bytes_ || !are_alike(options, options_)) {

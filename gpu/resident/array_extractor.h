@@ -7,8 +7,8 @@
 
 namespace isobrick::inline v0::gpu {
 
-/// Isosurfaces of an array: a volume that is a copy of it, and an extractor for the options of the
-/// last surface. Leaves the calling thread's current device as it was. Not thread-safe.
+/// Isosurfaces of an array: a volume of it, and an extractor for the options of the last surface.
+/// Leaves the calling thread's current device as it was. Not thread-safe.
 class ArrayExtractor {
  public:
   /// Strides are given, multiples of a sample. Throws UsageError for samples that are not in a

@@ -10,7 +10,6 @@
 #include "gpu/memory/nvtx_range.h"
 #include "gpu/memory/pool_memory.h"
 #include "gpu/resident/device_volume_impl.h"
-#include "gpu/resident/pack_kernel.h"
 #include "gpu/search/search_kernel.h"
 #include "gpu/tile/tile_block.h"
 
@@ -54,45 +53,16 @@ DeviceVolume::Impl::Impl(const Lattice& l, double fill, const DeviceTiles& wante
   if (wanted.loaded.empty()) complete();
 }
 
-DeviceVolume::Impl::Impl(const DeviceArray& array)
-    : lattice{array.extent, {64, 64, 64}, array.type},
+DeviceVolume::Impl::Impl(const DeviceArray& samples)
+    : lattice{samples.extent, {64, 64, 64}, samples.type},
       fill_value(0),
-      stream(array.stream, array.memory ? array.memory : pool_memory()) {
+      stream(samples.stream, samples.memory ? samples.memory : pool_memory()) {
   if (volume(lattice.tiles()) >= kNone)
     throw UsageError("the array has too many tiles to be resident on a device");
-  const std::size_t blocks = grid_tiles() + 1;
-  tile_blocks = DeviceBuffer<std::byte>(blocks * block_bytes(), stream);
-  columns = DeviceBuffer<std::byte>(blocks * kColumnSamples * lattice.sample_bytes(), stream);
-  check(cudaMemsetAsync(tile_blocks.data(), 0, block_bytes(), stream.get()));
-  list_tiles(all_tiles(lattice, true));
-  pack(array);
-}
-
-void DeviceVolume::Impl::pack(const DeviceArray& array) {
-  const NvtxRange range("pack an array");
-  const DeviceBuffer<std::byte> part_ranges(8 * ranges.bytes(), stream);
-  const DeviceBuffer<std::uint32_t> found_nan(1, stream);
-  check(cudaMemsetAsync(found_nan.data(), 0, found_nan.bytes(), stream.get()));
-  PackParams p{};
-  p.samples = array.samples;
-  for (int axis = 0; axis < 3; ++axis) {
-    p.strides[axis] = array.strides[axis] / static_cast<Index>(lattice.sample_bytes());
-    p.extent[axis] = static_cast<std::int32_t>(lattice.extent[axis]);
-    p.tiles[axis] = static_cast<std::int32_t>(lattice.tiles()[axis]);
-  }
-  p.order = tiles.data();
-  p.count = tile_count;
-  p.tile_blocks = tile_blocks.data();
-  p.columns = columns.data();
-  p.part_ranges = part_ranges.data();
-  p.ranges = ranges.data();
-  p.found_nan = found_nan.data();
-  launch_pack(lattice.type, p, stream.get());
-  std::uint32_t found = 0;
-  check(cudaMemcpyAsync(&found, found_nan.data(), sizeof found, cudaMemcpyDeviceToHost,
-                        stream.get()));
-  stream.wait();
-  has_nan = found != 0;
+  array.emplace(samples, lattice, stream);
+  array->launch_ranges();
+  list_tiles(all_tiles(lattice, true));  // while the device reads
+  has_nan = array->finish_ranges(tiles.data(), ranges.data());
 }
 
 DeviceVolume::Impl::~Impl() {
@@ -110,7 +80,6 @@ void DeviceVolume::Impl::list_tiles(std::span<const Int3> searched) {
   check(cudaMemcpyAsync(tiles.data(), order.data(), tiles.bytes(), cudaMemcpyHostToDevice,
                         stream.get()));
   ranges = DeviceBuffer<std::byte>(2 * lattice.sample_bytes() * tile_count, stream);
-  stream.wait();
 }
 
 void DeviceVolume::Impl::load(std::span<const Int3> more, const BrickLookup& bricks) {
@@ -167,10 +136,14 @@ void DeviceVolume::Impl::complete() {
 
 TileParams DeviceVolume::Impl::params() const {
   TileParams p{};
-  p.tile_blocks = tile_blocks.data();
-  p.block_of_tile = block_of_tile.data();
-  p.fill_tile_block = 0;
-  p.columns = columns.data();
+  if (array) {
+    array->give(p);
+  } else {
+    p.tile_blocks = tile_blocks.data();
+    p.block_of_tile = block_of_tile.data();
+    p.fill_tile_block = 0;
+    p.columns = columns.data();
+  }
   for (int axis = 0; axis < 3; ++axis) {
     p.tiles[axis] = static_cast<std::int32_t>(lattice.tiles()[axis]);
     p.extent[axis] = static_cast<std::int32_t>(lattice.extent[axis]);

@@ -1,10 +1,12 @@
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include <isobrick/device_volume.h>
 #include "gpu/memory/device_buffer.h"
 #include "gpu/memory/pinned_buffer.h"
+#include "gpu/resident/array_blocks.h"
 #include "gpu/tile/tile_params.h"
 
 namespace isobrick::inline v0::gpu {
@@ -20,10 +22,11 @@ struct DeviceVolume::Impl {
   DeviceBuffer<std::uint32_t> block_of_tile;  ///< [z, y, x]; empty where block i + 1 is of tile i
   DeviceBuffer<std::int32_t> tiles;           ///< x, y, z of the searched, in their order
   DeviceBuffer<std::byte> ranges;             ///< of the searched, in their order
+  std::optional<ArrayBlocks> array;  ///< where it is one of an array, instead of the blocks
 
   Impl(const Lattice& lattice, double fill_value, const DeviceTiles& tiles,
        std::size_t staging_bytes);
-  explicit Impl(const DeviceArray& array);
+  explicit Impl(const DeviceArray& samples);
   ~Impl();
 
   void load(std::span<const Int3> tiles, const BrickLookup& bricks);
@@ -43,7 +46,6 @@ struct DeviceVolume::Impl {
   void list_tiles(std::span<const Int3> searched);
   void load_staged(std::span<const Int3> tiles, const BrickLookup& bricks);
   void complete();
-  void pack(const DeviceArray& array);
 
   std::vector<std::uint32_t> table_;  ///< block_of_tile, until all are loaded
   std::size_t loaded_ = 0;            ///< tiles

@@ -82,10 +82,18 @@ struct ResidentExtractor::Impl {
       room.normals = {};
     }
     if (triangles) room.triangles = {};
-    stream().wait();  // the driver has the memory back before it is asked for more
+    // The driver has the memory back before it is asked for more.
+    if (now.vertices + now.triangles > 0) stream().wait();
     if (vertices && normals()) room.normals = {size.vertices, stream()};
     if (vertices) room.positions = {size.vertices, stream()};  // last: its size is the capacity
     if (triangles) room.triangles = {size.triangles, stream()};
+  }
+
+  void make_blocks() {
+    if (bytes() + launcher.bytes_of_blocks() > max_bytes) allocate({});
+    if (bytes() + launcher.bytes_of_blocks() > max_bytes)
+      throw OutOfDeviceMemory("the samples that the surface touches do not fit the device");
+    launcher.make_blocks();
   }
 
   void make_row_tables(std::uint32_t tiles) {
@@ -138,11 +146,14 @@ struct ResidentExtractor::Impl {
       const MeshSize expected =
           room.positions.size() == 0 ? room_for(last.active_tiles) : MeshSize{};
       // Tiles without a row table are not begun: the first launch reports how many there are.
-      if (last.active_tiles > launcher.tiles_with_room()) {
+      const bool lacks_tables = last.active_tiles > launcher.tiles_with_room();
+      const bool lacks_blocks = launcher.lacks_blocks();
+      if (lacks_blocks) make_blocks();
+      if (lacks_tables) {
         make_row_tables(last.active_tiles);
         make_room({}, expected);
-        continue;
       }
+      if (lacks_blocks || lacks_tables) continue;
       if (last.vertices > std::numeric_limits<std::uint32_t>::max())
         throw Error(
             "the mesh has more than 4294967295 vertices, which an indexed mesh of 32 bits cannot "

@@ -4,6 +4,10 @@
 #include <atomic>
 #include <cstddef>
 #include <cstring>
+#include <map>
+#include <mutex>
+#include <utility>
+#include <vector>
 
 #include <isobrick/error.h>
 #include "core/threshold.h"
@@ -18,6 +22,34 @@ namespace {
 
 /// How often the host reads a report before it queries the driver for errors.
 constexpr std::uint32_t kReadsBetweenQueries = 4096;
+
+/// Zeroed memory for a report, on the current device. It is kept for the next one: to pin a page
+/// takes as long as to make a small mesh.
+std::shared_ptr<PinnedBuffer<LaunchReport>> take_report() {
+  using Report = PinnedBuffer<LaunchReport>;
+  struct Kept {
+    std::mutex mutex;
+    std::map<int, std::vector<std::unique_ptr<Report>>> of_device;
+  };
+  static const auto kept = std::make_shared<Kept>();
+  int device = 0;
+  check(cudaGetDevice(&device));
+  std::unique_ptr<Report> report;
+  {
+    const std::lock_guard lock(kept->mutex);
+    auto& free = kept->of_device[device];
+    if (!free.empty()) {
+      report = std::move(free.back());
+      free.pop_back();
+    }
+  }
+  if (!report) report = std::make_unique<Report>(1);
+  report->data()[0] = {};
+  return {report.release(), [home = kept, device](Report* used) {
+            const std::lock_guard lock(home->mutex);
+            home->of_device[device].emplace_back(used);
+          }};
+}
 
 SurfaceOptions checked(SurfaceOptions options, const Lattice& lattice) {
   check_supported(options);
@@ -48,7 +80,8 @@ ResidentLauncher::ResidentLauncher(DeviceVolume::Impl& volume, const SurfaceOpti
       items_(volume.tile_count, volume.stream),
       slot_of_tile_(volume.grid_tiles(), volume.stream),
       order_(volume.tile_count, volume.stream),
-      words_(sizeof(Counters) + sizeof(unsigned long long) * search_blocks(), volume.stream) {
+      words_(sizeof(Counters) + sizeof(unsigned long long) * search_blocks(), volume.stream),
+      report_(take_report()) {
   const cudaStream_t stream = volume.stream.get();
   const CaseTable table = make_case_table(world_map(options_.transform, options_.inside).mirrored);
   check(cudaMemcpyAsync(cases_.data(), &table, sizeof table, cudaMemcpyHostToDevice, stream));
@@ -115,9 +148,10 @@ void ResidentLauncher::launch_search(double isovalue) {
 }
 
 LaunchEnd ResidentLauncher::launch_end() const {
-  return {.report = report_.on_device(),
+  return {.report = report_->on_device(),
           .launch = launches_ + 1,
           .found = &counters()->found,
+          .blocks = volume_.array ? volume_.array->wanted() : nullptr,
           .done = &counters()->done,
           .zero = &counters()->search_ticket,
           .zero_words = static_cast<std::uint32_t>(
@@ -164,19 +198,23 @@ LaunchShape ResidentLauncher::shape_for(const DeviceCounts& last) const {
 bool ResidentLauncher::launch(double isovalue, const MeshRoom& room, const DeviceCounts& last) {
   if (volume_.tile_count == 0 || is_above_all_samples(isovalue)) return false;
   launch_search(isovalue);
+  if (volume_.array)
+    volume_.array->launch_load(items_.data(), &counters()->found, &counters()->item_count,
+                               static_cast<int>(sample_reach(options_)));
   launch_tiles(isovalue, room, last);
   return true;
 }
 
-bool ResidentLauncher::read_report(DeviceCounts& counts) const {
+bool ResidentLauncher::read_report(DeviceCounts& counts, std::uint32_t& blocks) const {
   std::uint64_t words[LaunchReport::kWords];
   for (int i = 0; i < LaunchReport::kWords; ++i) {
-    words[i] = std::atomic_ref(report_[0].words[i]).load(std::memory_order_relaxed);
+    words[i] = std::atomic_ref(report_->data()->words[i]).load(std::memory_order_relaxed);
     if (!LaunchWord::is_about(words[i], launches_)) return false;
     words[i] = LaunchWord::value_of(words[i]);
   }
   counts = {words[LaunchReport::kVertices], words[LaunchReport::kTriangles],
             static_cast<std::uint32_t>(words[LaunchReport::kActiveTiles])};
+  blocks = static_cast<std::uint32_t>(words[LaunchReport::kBlocks]);
   return true;
 }
 
@@ -186,19 +224,20 @@ DeviceCounts ResidentLauncher::wait() {
   for (std::uint32_t reads = 1;; ++reads) {
     // Before the report is read: afterwards nobody writes it any more.
     const bool over = reads % kReadsBetweenQueries == 0 && volume_.stream.is_over();
-    if (DeviceCounts counts; read_report(counts)) return counts;
+    if (DeviceCounts counts; read_report(counts, wanted_blocks_)) return counts;
     if (over) throw Error("the device ended an extraction without a report");
   }
 }
 
 bool ResidentLauncher::is_reported() const {
   DeviceCounts counts;
-  return read_report(counts);
+  std::uint32_t blocks = 0;
+  return read_report(counts, blocks);
 }
 
 std::uint64_t ResidentLauncher::bytes() const {
   return cases_.bytes() + items_.bytes() + slot_of_tile_.bytes() + order_.bytes() + words_.bytes() +
-         row_tables_.bytes();
+         row_tables_.bytes() + (volume_.array ? volume_.array->bytes() : 0);
 }
 
 }  // namespace isobrick::gpu

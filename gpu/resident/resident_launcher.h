@@ -1,5 +1,7 @@
 #pragma once
 
+#include <memory>
+
 #include <isobrick/surface_options.h>
 #include "gpu/resident/device_volume_impl.h"
 #include "gpu/tile/tile_kernel.h"
@@ -34,6 +36,15 @@ class ResidentLauncher {
   std::size_t tiles_with_room() const { return row_tables_.size(); }
   void make_row_tables(std::uint32_t count);
 
+  /// Whether the last launch wanted more blocks of an array than there is room for, and so made
+  /// nothing.
+  bool lacks_blocks() const { return volume_.array && volume_.array->lacks_room(wanted_blocks_); }
+  /// Bytes that make_blocks() takes beyond what is held.
+  std::uint64_t bytes_of_blocks() const {
+    return volume_.array->bytes_to_make_room(wanted_blocks_);
+  }
+  void make_blocks() { volume_.array->make_room(wanted_blocks_); }
+
   const SurfaceOptions& options() const { return options_; }
   const Stream& stream() const { return volume_.stream; }
   std::uint64_t bytes() const;
@@ -51,20 +62,21 @@ class ResidentLauncher {
   void launch_tiles(double isovalue, const MeshRoom& room, const DeviceCounts& last);
   LaunchEnd launch_end() const;
   LaunchShape shape_for(const DeviceCounts& last) const;
-  bool read_report(DeviceCounts& counts) const;
+  bool read_report(DeviceCounts& counts, std::uint32_t& blocks) const;
 
   DeviceVolume::Impl& volume_;
   SurfaceOptions options_;
   ResidentTuning tuning_;
   LaunchShapes shapes_;
   std::uint32_t launches_ = 0, epoch_ = 0;
+  std::uint32_t wanted_blocks_ = 0;  ///< of an array, by the last launch
   DeviceBuffer<CaseTable> cases_;
   DeviceBuffer<TileItem> items_;
   DeviceBuffer<std::uint32_t> slot_of_tile_;
   DeviceBuffer<OrderState> order_;
   DeviceBuffer<std::byte> words_;  ///< Counters, then the sums of the search
   DeviceBuffer<RowTable> row_tables_;
-  PinnedBuffer<LaunchReport> report_{1};
+  std::shared_ptr<PinnedBuffer<LaunchReport>> report_;
 };
 
 }  // namespace isobrick::gpu

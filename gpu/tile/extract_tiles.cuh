@@ -34,6 +34,7 @@ __device__ void end_launch(TileShared& s, const TileParams& p) {
   if (s.done_before + 1 < gridDim.x) return;
   if (threadIdx.x == 0) {
     report(p, LaunchReport::kActiveTiles, *end.found);
+    report(p, LaunchReport::kBlocks, end.blocks ? *end.blocks : 0);
     if (s.items == 0) {
       report(p, LaunchReport::kVertices, 0);
       report(p, LaunchReport::kTriangles, 0);

@@ -76,19 +76,20 @@ static_assert(LaunchWord::is_about(LaunchWord::of(5, (1u << 24) + 1), (1u << 24)
 static_assert(!LaunchWord::is_about(LaunchWord::of(5, 1u << 24), (1u << 24) - 1));
 static_assert(LaunchWord::value_of(LaunchWord::of((1ull << 40) - 1, 77)) == (1ull << 40) - 1);
 
-/// What a launch reports: vertices and triangles made, and active tiles.
+/// What a launch reports: vertices and triangles made, active tiles, blocks that it wanted.
 struct LaunchReport {
-  static constexpr int kVertices = 0, kTriangles = 1, kActiveTiles = 2, kWords = 3;
+  static constexpr int kVertices = 0, kTriangles = 1, kActiveTiles = 2, kBlocks = 3, kWords = 4;
   std::uint64_t words[kWords];
 };
 
 /// How a launch reports what it has made and prepares the counters for the next launch.
 struct LaunchEnd {
-  LaunchReport* report;        ///< or null: the launch writes `totals` instead
-  std::uint32_t launch;        ///< goes into the report
-  const std::uint32_t* found;  ///< active tiles, as the search has counted them
-  std::uint32_t* done;         ///< zeroed
-  std::uint32_t* zero;         ///< words that the next launch needs zeroed, also `done`
+  LaunchReport* report;         ///< or null: the launch writes `totals` instead
+  std::uint32_t launch;         ///< goes into the report
+  const std::uint32_t* found;   ///< active tiles, as the search has counted them
+  const std::uint32_t* blocks;  ///< that tiles of an array wanted; null: of no array
+  std::uint32_t* done;          ///< zeroed
+  std::uint32_t* zero;          ///< words that the next launch needs zeroed, also `done`
   std::uint32_t zero_words;
 };
 

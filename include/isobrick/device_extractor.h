@@ -34,9 +34,9 @@ class ISOBRICK_API PendingDeviceMesh {
 /// Isosurfaces of an array in device memory, byte for byte those of VolumeExtractor. Samples and
 /// mesh stay on the device. Not thread-safe.
 ///
-/// The constructor copies the samples to blocks of 32³ and finds their ranges, in one pass; the
-/// copy takes a little more memory than the samples. Each isovalue then reads only the blocks that
-/// it touches, and no longer the array.
+/// The constructor reads the samples once and finds their ranges. Each isovalue then reads only the
+/// blocks of 32³ samples that it touches. It copies those which no isovalue before has touched;
+/// the copies and the mesh are all the memory that is taken. The array must stay as it is.
 ///
 /// Of ExtractOptions, `isovalue`, `roi`, `inside`, `normals` and `gpu_memory` matter; `inside` is
 /// above by default, `gpu_memory` without bound. The calling thread's current device is afterwards
@@ -45,7 +45,7 @@ class ISOBRICK_API DeviceExtractor {
  public:
   struct Impl;  ///< private to the library
 
-  /// Waits until the samples are copied. Throws UsageError for an array that makes no sense: no
+  /// Waits until the ranges are known. Throws UsageError for an array that makes no sense: no
   /// samples or not of a device, an extent that is not positive, strides of which one is 0 or no
   /// multiple of a sample; gpu::OutOfDeviceMemory; Error where there is no CUDA.
   explicit DeviceExtractor(const DeviceArray& array);

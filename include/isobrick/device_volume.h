@@ -35,8 +35,9 @@ class ISOBRICK_API DeviceVolume {
   /// pass through twice `staging_bytes` of pinned memory, at least a block's. Throws as above.
   DeviceVolume(const Lattice& lattice, double fill_value, const DeviceTiles& tiles,
                std::size_t staging_bytes);
-  /// Copies an array of the current device in its stream, and waits until that is done. Strides are
-  /// given, multiples of a sample.
+  /// Of an array of the current device, which must stay as it is: extractors copy the tiles that
+  /// surfaces look at. Finds the ranges of all tiles and waits for them. Strides are given,
+  /// multiples of a sample.
   explicit DeviceVolume(const DeviceArray& array);
   ~DeviceVolume();
 
@@ -47,7 +48,7 @@ class ISOBRICK_API DeviceVolume {
   const Lattice& lattice() const;
   /// Whether a sample of an array is NaN; not known of bricks.
   bool has_nan() const;
-  /// Bytes of device memory that it holds.
+  /// Bytes of device memory that it holds; the copied tiles of an array are its extractors'.
   std::uint64_t bytes() const;
 
   struct Impl;  ///< private to the library

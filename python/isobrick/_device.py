@@ -26,7 +26,7 @@ def _stream_number(stream):
         stream = getattr(stream, name, stream)
     try:
         return int(getattr(stream, "value", stream))
-    except TypeError:
+    except (TypeError, ValueError):
         raise TypeError(f"stream must be a CUDA stream, not {stream!r}") from None
 
 
@@ -51,6 +51,7 @@ class DeviceSamples:
             self.native = _isobrick.DeviceExtractor.of_capsule(
                 array.__dlpack__(stream=stream), place, stream
             )
+        self.array = array  # which the extractor reads
         self.shape = self.native.shape
         self.dtype = np.dtype(self.native.dtype)
 

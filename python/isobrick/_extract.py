@@ -22,7 +22,7 @@ class Extractor:
         Anything else with `shape`, `dtype` and `__getitem__` (dask, zarr, h5py) is read by blocks,
         never as a whole. A `xarray.DataArray` gives spacing, origin and unit by its coordinates.
         An array in the memory of a CUDA device (PyTorch, CuPy, JAX, Numba) stays there: its
-        surfaces are a `DeviceMesh`. Its samples are copied once, within the device.
+        surfaces are a `DeviceMesh`. It must stay as it is while the extractor is used.
     spacing, origin : three floats x, y, z, optional
         Distance between samples, and the place of sample [0, 0, 0], in world space.
     direction : 3×3 floats, optional

@@ -87,7 +87,8 @@ class TakenTensor {
 /// Surfaces of an array in device memory.
 class PythonDeviceExtractor {
  public:
-  explicit PythonDeviceExtractor(const DeviceArray& array) : extractor_(array), array_(array) {}
+  PythonDeviceExtractor(const DeviceArray& array, std::unique_ptr<const TakenTensor> tensor)
+      : tensor_(std::move(tensor)), extractor_(array), array_(array) {}
 
   DeviceMesh extract(const ExtractOptions& options) {
     const py::gil_scoped_release release;
@@ -98,17 +99,19 @@ class PythonDeviceExtractor {
   std::string type() const { return std::string(zarr_name(array_.type)); }
 
  private:
+  std::unique_ptr<const TakenTensor> tensor_;  ///< the array's memory; null: the package keeps it
   std::mutex mutex_;
   DeviceExtractor extractor_;
   DeviceArray array_;  ///< how it was described
 };
 
-std::unique_ptr<PythonDeviceExtractor> extractor_of(DeviceArray array, const Transform& transform,
-                                                    std::uintptr_t stream) {
+std::unique_ptr<PythonDeviceExtractor> extractor_of(
+    DeviceArray array, const Transform& transform, std::uintptr_t stream,
+    std::unique_ptr<const TakenTensor> tensor = {}) {
   array.transform = transform;
   array.stream = stream_of(stream);
   const py::gil_scoped_release release;
-  return std::make_unique<PythonDeviceExtractor>(array);
+  return std::make_unique<PythonDeviceExtractor>(array, std::move(tensor));
 }
 
 /// An array of a mesh: rows of three numbers of 32 bits.
@@ -190,8 +193,9 @@ void bind_device(py::module_& module) {
       .def_static(
           "of_capsule",
           [](const py::capsule& capsule, const Transform& transform, std::uintptr_t stream) {
-            const TakenTensor tensor(capsule);
-            return extractor_of(tensor.array(), transform, stream);
+            auto tensor = std::make_unique<const TakenTensor>(capsule);
+            const DeviceArray array = tensor->array();
+            return extractor_of(array, transform, stream, std::move(tensor));
           })
       .def("extract", &PythonDeviceExtractor::extract)
       .def_property_readonly("shape", &PythonDeviceExtractor::shape)

@@ -77,13 +77,11 @@ def test_arrays_of_any_strides(library):
     to_device = library[0]
     field = ball()
     on_device = to_device(field)
-    for take in (
-        lambda a: a[::2, :, ::3],
-        lambda a: a.transpose(2, 1, 0) if isinstance(a, np.ndarray) or hasattr(a, "get")
-        else a.permute(2, 1, 0) if hasattr(a, "permute") else a.T,
-        lambda a: a[3:, 4:, 1:],
-    ):
-        expect_same(isobrick.extract(take(on_device), 40), take(field), 40)
+    for part in (np.s_[::2, :, ::3], np.s_[3:, 4:, 1:]):
+        expect_same(isobrick.extract(on_device[part], 40), field[part], 40)
+    turn = getattr(on_device, "permute", getattr(on_device, "transpose", None))
+    if not hasattr(on_device, "copy_to_host"):  # Numba turns no volumes
+        expect_same(isobrick.extract(turn(2, 1, 0), 40), field.transpose(2, 1, 0), 40)
 
 
 def test_parts_and_missing_samples(library):
@@ -141,7 +139,7 @@ class Described:
     """An array that says that it is in device memory."""
 
     def __init__(self, array, **changes):
-        self.array = array
+        self.array, self.shape, self.dtype = array, array.shape, array.dtype
         self.__cuda_array_interface__ = {
             "shape": array.shape,
             "typestr": array.dtype.str,

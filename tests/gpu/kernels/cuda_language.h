@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <bit>
@@ -92,12 +93,27 @@ T atomicAdd(T* to, std::type_identity_t<T> value) {
   return std::atomic_ref(*to).fetch_add(value, std::memory_order_relaxed);
 }
 
+inline std::uint32_t __vimin3_u16x2(std::uint32_t a, std::uint32_t b, std::uint32_t c) {
+  const auto least = [&](int shift) {
+    return std::min({a >> shift & 0xffffu, b >> shift & 0xffffu, c >> shift & 0xffffu}) << shift;
+  };
+  return least(0) | least(16);
+}
+inline std::uint32_t __vimax3_u16x2(std::uint32_t a, std::uint32_t b, std::uint32_t c) {
+  const auto most = [&](int shift) {
+    return std::max({a >> shift & 0xffffu, b >> shift & 0xffffu, c >> shift & 0xffffu}) << shift;
+  };
+  return most(0) | most(16);
+}
+
+template <class T>
+T atomicCAS(T* at, std::type_identity_t<T> expected, std::type_identity_t<T> value) {
+  std::atomic_ref(*at).compare_exchange_strong(expected, value, std::memory_order_relaxed);
+  return expected;
+}
+
 template <class T>
 T __ldg(const T* from) {
-  return *from;
-}
-template <class T>
-T __ldcs(const T* from) {
   return *from;
 }
 template <class T>

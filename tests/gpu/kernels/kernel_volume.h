@@ -250,9 +250,13 @@ struct KernelState {
     p.number_start = &number_start;
     p.number_end = &number_end;
     p.ticket = zeroed_words() + 1;
-    p.end = {&report,        ++launches,
-             &found,         zeroed_words() + 2,
-             zeroed_words(), static_cast<std::uint32_t>(2 * zeroed.size())};
+    p.end = {&report,
+             ++launches,
+             &found,
+             nullptr,
+             zeroed_words() + 2,
+             zeroed_words(),
+             static_cast<std::uint32_t>(2 * zeroed.size())};
   }
 
   std::uint64_t word(int i) {

@@ -5,7 +5,8 @@
 #include <stdexcept>
 
 #include "core/threshold.h"
-#include "gpu/resident/pack_tiles.cuh"
+#include "gpu/resident/array_blocks.cuh"
+#include "gpu/resident/array_ranges.cuh"
 #include "gpu/search/search_tiles.cuh"
 #include "gpu/stream/unpack_tiles.cuh"
 #include "gpu/tile/extract_tiles.cuh"
@@ -23,6 +24,20 @@ struct Kernel {
            [&] { gpu::extract_tiles<N, T, Normals, Nan>(params, threshold, &cases); });
   }
 };
+
+/// Calls f(TypeTag<T>, order) with the order as a type.
+template <class F>
+void visit_order(ScalarType type, const gpu::ArrayParams& array, F&& f) {
+  visit_scalar(type, [&](auto tag) {
+    using enum gpu::ArrayOrder;
+    switch (gpu::array_order(array, sizeof(typename decltype(tag)::type))) {
+      case vectors: return f(tag, std::integral_constant<gpu::ArrayOrder, vectors>());
+      case along_x: return f(tag, std::integral_constant<gpu::ArrayOrder, along_x>());
+      case along_y: return f(tag, std::integral_constant<gpu::ArrayOrder, along_y>());
+      case along_z: return f(tag, std::integral_constant<gpu::ArrayOrder, along_z>());
+    }
+  });
+}
 
 template <class T, class F>
 auto with_nan_kernel(const TileRun& r, F& f) {
@@ -79,26 +94,21 @@ void run_first_columns(ScalarType type, const void* tile_blocks, std::uint32_t c
   });
 }
 
-void run_pack(ScalarType type, const gpu::PackParams& p, unsigned seed) {
-  visit_scalar(type, [&](auto tag) {
+void run_array_ranges(ScalarType type, const gpu::ArrayRangeParams& p, unsigned seed) {
+  visit_order(type, p.array, [&](auto tag, auto order) {
     using T = typename decltype(tag)::type;
-    const auto run = [&](auto&& kernel) { launch(p.count, gpu::kPackThreads, 0, seed, kernel); };
-    switch (gpu::pack_order(p, sizeof(T))) {
-      case gpu::PackOrder::vectors:
-        run([&] { gpu::pack_tiles<T, gpu::PackOrder::vectors>(p); });
-        break;
-      case gpu::PackOrder::along_x:
-        run([&] { gpu::pack_tiles<T, gpu::PackOrder::along_x>(p); });
-        break;
-      case gpu::PackOrder::along_y:
-        run([&] { gpu::pack_tiles<T, gpu::PackOrder::along_y>(p); });
-        break;
-      case gpu::PackOrder::along_z:
-        run([&] { gpu::pack_tiles<T, gpu::PackOrder::along_z>(p); });
-        break;
-    }
-    launch((p.count + gpu::kPackThreads - 1) / gpu::kPackThreads, gpu::kPackThreads, 0, seed,
+    launch(p.count, gpu::kArrayThreads, 0, seed,
+           [&] { gpu::find_part_ranges<T, decltype(order)::value>(p); });
+    launch((p.count + gpu::kArrayThreads - 1) / gpu::kArrayThreads, gpu::kArrayThreads, 0, seed,
            [&] { gpu::join_part_ranges<T>(p); });
+  });
+}
+
+void run_load(ScalarType type, const gpu::ArrayLoadParams& p, unsigned seed) {
+  launch(3, gpu::kArrayThreads, 0, seed, [&] { gpu::claim_blocks(p); });
+  visit_order(type, p.array, [&](auto tag, auto order) {
+    using T = typename decltype(tag)::type;
+    launch(3, gpu::kArrayThreads, 0, seed, [&] { gpu::copy_tiles<T, decltype(order)::value>(p); });
   });
 }
 

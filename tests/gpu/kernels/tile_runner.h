@@ -1,7 +1,7 @@
 #pragma once
 
 #include <isobrick/scalar.h>
-#include "gpu/resident/pack_params.h"
+#include "gpu/resident/array_params.h"
 #include "gpu/search/search_params.h"
 #include "gpu/stream/unpack_params.h"
 #include "gpu/tile/tile_params.h"
@@ -26,7 +26,8 @@ void run_tile_ranges(ScalarType type, const gpu::TileParams& params, const std::
                      std::uint32_t count, void* ranges);
 void run_first_columns(ScalarType type, const void* tile_blocks, std::uint32_t count,
                        void* columns);
-void run_pack(ScalarType type, const gpu::PackParams& params, unsigned seed);
+void run_array_ranges(ScalarType type, const gpu::ArrayRangeParams& params, unsigned seed);
+void run_load(ScalarType type, const gpu::ArrayLoadParams& params, unsigned seed);
 void run_unpack(ScalarType type, const gpu::UnpackParams& params, unsigned seed);
 
 }  // namespace isobrick::emulated
