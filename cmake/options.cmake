@@ -47,6 +47,7 @@ endif()
 option(ISOBRICK_PRECOMPILED_HEADERS "Precompile the headers of other libraries" OFF)
 function(isobrick_precompiled target)
   if(ISOBRICK_PRECOMPILED_HEADERS AND NOT target STREQUAL isobrick_core)
+    target_link_libraries(${target} PRIVATE fmt::fmt)  # whose macros must be those of the headers
     target_precompile_headers(${target} REUSE_FROM isobrick_core)
   endif()
 endfunction()
