@@ -102,8 +102,6 @@ VolumePass::VolumePass(VolumeSamples& samples, const ExtractOptions& options, In
 /// Divides the budget among the ranges, what waits between tiles, work spaces, output and regions.
 void VolumePass::plan(bool has_sink, std::uint64_t sink_bytes) {
   const Lattice& lattice = samples_.lattice;
-  const Int3 t = lattice.tiles();
-  const auto faces = static_cast<std::uint64_t>(t.x * t.y + t.y * t.z + t.x * t.z);
   const std::uint64_t workspace =
       CpuExtractor::workspace_bytes(lattice.type, surface_.drop_degenerate);
   const std::uint64_t tile_output = CpuExtractor::max_tile_output(surface_.normals);
@@ -112,8 +110,9 @@ void VolumePass::plan(bool has_sink, std::uint64_t sink_bytes) {
     const Int3 n = min(kOne * (edge * kTileEdge + 3), lattice.extent);
     return 2 * static_cast<std::uint64_t>(volume(n)) * size_of(samples_.read_type);
   };
-  const std::uint64_t fixed = sink_bytes + volume_ranges_bytes(lattice) +
-                              faces * CpuExtractor::boundary_bytes(surface_.drop_degenerate);
+  const std::uint64_t fixed =
+      sink_bytes + volume_ranges_bytes(lattice) +
+      CpuExtractor::boundary_bytes(lattice.tiles(), surface_.drop_degenerate);
   const std::uint64_t least =
       fixed + workspace + region_bytes(1) + (has_sink ? 2 * tile_output : 0);
   if (budget_ < least)
