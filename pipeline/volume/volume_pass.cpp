@@ -88,7 +88,7 @@ VolumePass::VolumePass(VolumeSamples& samples, const ExtractOptions& options, In
   if (std::isnan(options.isovalue)) throw UsageError("the isovalue is not a number");
   if (options.backend == Backend::cuda)
     throw UsageError("samples in host memory are extracted on the CPU");
-  check_coordinates(samples.transform, lattice.extent, "the volume");
+  check_transform(samples.transform, lattice.extent, "the volume");
   surface_ = {.isovalue = options.isovalue,
               .inside = options.inside.value_or(Inside::above),
               .normals = options.normals,
