@@ -68,12 +68,14 @@ struct StoreReader::Impl {
   std::optional<StoredRanges> find_ranges() const;
   void open_level(const ImageMetadata::Level& described, MetadataFiles::Level&& read);
   void open_ranges(int level, const RangeChecksums& checksums);
+  void check_level(int level) const;
   void check_brick(int level, Int3 b) const;
   [[noreturn]] void damaged(int level, Int3 b, const Place& place, const std::string& what) const;
   void widen_brick(int level, Int3 b, const Place& place, const std::byte* stored,
                    std::byte* out) const;
   Int3 shard_of(int level, Int3 b) const;
   std::string shard_key(int level, Int3 s) const;
+  [[noreturn]] void missing_shard(int level, Int3 s, const char* why) const;
   std::shared_ptr<const StoredObject> shard_object(int level, Int3 s);
   std::shared_ptr<const ShardIndex> shard_index(int level, Int3 s);
   std::optional<Place> find_unchecked(int level, Int3 b);
@@ -177,9 +179,13 @@ void StoreReader::Impl::open_level(const ImageMetadata::Level& described,
   levels.push_back(std::move(level));
 }
 
-void StoreReader::Impl::check_brick(int level, Int3 b) const {
+void StoreReader::Impl::check_level(int level) const {
   if (level < 0 || static_cast<std::size_t>(level) >= levels.size())
     throw UsageError(fmt::format("'{}' has no level {}", info.name, level));
+}
+
+void StoreReader::Impl::check_brick(int level, Int3 b) const {
+  check_level(level);
   if (!Box3{{0, 0, 0}, lattice(level).bricks()}.contains(b))
     throw UsageError(fmt::format("level {} has no brick ({}, {}, {})", level, b.x, b.y, b.z));
 }
@@ -210,6 +216,11 @@ std::string StoreReader::Impl::shard_key(int level, Int3 s) const {
   std::vector<Index> coordinates = at(level).place.chunk;
   coordinates.insert(coordinates.end(), {s.z, s.y, s.x});
   return join_key(at(level).folder, at(level).metadata.chunk_key(coordinates));
+}
+
+void StoreReader::Impl::missing_shard(int level, Int3 s, const char* why) const {
+  throw DamageError(fmt::format("level {}, shard ({}, {}, {}): {} is missing, {}", level, s.x, s.y,
+                                s.z, quoted(*storage, shard_key(level, s)), why));
 }
 
 std::shared_ptr<const StoredObject> StoreReader::Impl::shard_object(int level, Int3 s) {
@@ -259,7 +270,11 @@ std::optional<StoreReader::Impl::Place> StoreReader::Impl::find_unchecked(int le
   const ShardIndex::Entry entry =
       (*index)[at(level).place.in_shard * grid.shard_bricks() + grid.place_in_shard(b)];
   if (entry.absent()) return std::nullopt;
-  return Place{shard_object(level, s), entry.offset, entry.size};
+  auto object = shard_object(level, s);
+  // The index stays in its cache when the object was closed and opened again.
+  if (!object)
+    missing_shard(level, s, "but was there when its index was read; open the store anew");
+  return Place{std::move(object), entry.offset, entry.size};
 }
 
 // To Zarr a shard without an object holds nothing but fill values, so that a lost
@@ -269,12 +284,10 @@ std::optional<StoreReader::Impl::Place> StoreReader::Impl::find(int level, Int3 
   const auto& checksums = at(level).checksums;
   if (place || !checksums || checksums->at(b, bytes_read) == kAbsentBrick) return place;
   const Int3 s = shard_of(level, b);
-  const std::string shard = quoted(*storage, shard_key(level, s));
-  if (!shard_object(level, s))
-    throw DamageError(fmt::format("level {}, shard ({}, {}, {}): {} is missing, but has bricks",
-                                  level, s.x, s.y, s.z, shard));
+  if (!shard_object(level, s)) missing_shard(level, s, "but has bricks");
   throw DamageError(fmt::format("level {}, brick ({}, {}, {}): {} lacks it: {}", level, b.x, b.y,
-                                b.z, shard, why_other_content(info)));
+                                b.z, quoted(*storage, shard_key(level, s)),
+                                why_other_content(info)));
 }
 
 void StoreReader::Impl::check_content(int level, Int3 b, const Place& place,
@@ -289,7 +302,7 @@ void StoreReader::Impl::check_content(int level, Int3 b, const Place& place,
 }
 
 RangeTable StoreReader::Impl::ranges(int level, Box3 box, bool blocks) {
-  check_brick(level, {0, 0, 0});
+  check_level(level);
   const auto& reader = blocks ? at(level).block_ranges : at(level).brick_ranges;
   if (!reader)
     throw Error(fmt::format("level {} of '{}' has no ranges yet; run: {}", level, info.name,
@@ -396,7 +409,8 @@ BrickTimes StoreReader::brick_times() const {
 }
 
 bool StoreReader::has_ranges(int level) const {
-  const Impl::Level& l = impl_->levels.at(static_cast<std::size_t>(level));
+  impl_->check_level(level);
+  const Impl::Level& l = impl_->at(level);
   return l.brick_ranges && l.block_ranges && l.checksums->exists();
 }
 

@@ -46,7 +46,8 @@ void* move_pages(void* data, std::size_t old_bytes, std::size_t bytes) {
   std::byte* const place = reserve_addresses(bytes);
   void* const moved = mremap(data, old_bytes, bytes, MREMAP_MAYMOVE | MREMAP_FIXED, place);
   if (moved != MAP_FAILED) return moved;
-  munmap(place, bytes);
+  // mremap() may have unmapped the place before it failed, and another thread may have mapped
+  // memory there since. So the addresses are left alone: they hold no memory.
   throw std::bad_alloc();
 }
 

@@ -3,6 +3,9 @@
 #include <hwy/base.h>
 #include <hwy/targets.h>
 
+#include <algorithm>
+#include <atomic>
+
 // Functions that Highway compiled for several processors, and the choice among them. Its own
 // dispatch would do the same, but it links libhwy, which times its clock for 5 ms whenever a
 // program starts.
@@ -12,14 +15,15 @@ namespace isobrick::inline v0 {
 /// What this processor has of what functions are compiled for, from the least to the most.
 enum class SimdLevel { baseline, sse4, avx2, avx3, avx3_dl };
 
-inline SimdLevel simd_level() {
+inline SimdLevel find_simd_level() {
 #if HWY_ARCH_X86
   __builtin_cpu_init();
   const bool sse4 = __builtin_cpu_supports("sse4.1") && __builtin_cpu_supports("sse4.2") &&
                     __builtin_cpu_supports("aes") && __builtin_cpu_supports("pclmul");
   if (!sse4) return SimdLevel::baseline;
   const bool avx2 = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") &&
-                    __builtin_cpu_supports("bmi") && __builtin_cpu_supports("bmi2");
+                    __builtin_cpu_supports("bmi") && __builtin_cpu_supports("bmi2") &&
+                    __builtin_cpu_supports("f16c");
   if (!avx2) return SimdLevel::sse4;
   const bool avx3 = __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") &&
                     __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512bw") &&
@@ -27,12 +31,22 @@ inline SimdLevel simd_level() {
   if (!avx3) return SimdLevel::avx2;
   const bool avx3_dl =
       __builtin_cpu_supports("avx512vnni") && __builtin_cpu_supports("vpclmulqdq") &&
-      __builtin_cpu_supports("avx512vbmi") && __builtin_cpu_supports("avx512vbmi2") &&
-      __builtin_cpu_supports("avx512bitalg") && __builtin_cpu_supports("avx512vpopcntdq");
+      __builtin_cpu_supports("vaes") && __builtin_cpu_supports("avx512vbmi") &&
+      __builtin_cpu_supports("avx512vbmi2") && __builtin_cpu_supports("avx512bitalg") &&
+      __builtin_cpu_supports("avx512vpopcntdq");
   return avx3_dl ? SimdLevel::avx3_dl : SimdLevel::avx3;
 #else
   return SimdLevel::baseline;
 #endif
+}
+
+/// For tests: the functions of higher levels are not taken. No meaning of it is public.
+inline std::atomic<SimdLevel> max_simd_level = SimdLevel::avx3_dl;
+
+/// The level of this processor, or max_simd_level.
+inline SimdLevel simd_level() {
+  static const SimdLevel found = find_simd_level();
+  return std::min(found, max_simd_level.load(std::memory_order_relaxed));
 }
 
 /// The one that this processor runs best, of functions for each level; null where one was not

@@ -87,7 +87,7 @@ HWY_AFTER_NAMESPACE();
 namespace isobrick::inline v0 {
 
 bool merge_rows(ScalarType type, const RowBundle& bundle, void* lo, void* hi) {
-  static const auto best = ISOBRICK_BEST_OF(merge_of_type);
+  const auto best = ISOBRICK_BEST_OF(merge_of_type);
   return best(type, bundle, lo, hi);
 }
 

@@ -1,5 +1,6 @@
 #include "surface/boundary_map.h"
 
+#include <algorithm>
 #include <bit>
 
 #include "core/morton.h"
@@ -78,6 +79,24 @@ void BoundaryMap::forget_before(Int3 next) {
     map_.erase(found);
     expiries_.pop();
   }
+}
+
+// A tile waits for its last asker, one step up along each axis. Take the smallest aligned cube of
+// tiles that holds both. The next tile lies between them in Morton order, so in the same cube, and
+// the step crosses the middle of the cube along some axis. So the tile lies in one of the layers
+// below the middles of the cubes around the next tile: three of each size, those along an axis only
+// while the grid goes beyond the middle. Only the last tile of the grid waits for itself.
+// The layers of all sizes are never full at once. No grid holds more than its three upper faces,
+// which is less for a grid that is about a cube; the tests count it.
+std::uint64_t BoundaryMap::max_size(Int3 tiles) {
+  std::uint64_t layers = 1, faces = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    const Index a = tiles[(axis + 1) % 3], b = tiles[(axis + 2) % 3];
+    faces += static_cast<std::uint64_t>(a * b);
+    for (Index edge = 2; edge / 2 < tiles[axis]; edge *= 2)
+      layers += static_cast<std::uint64_t>(std::min(a, edge) * std::min(b, edge));
+  }
+  return std::min(layers, faces);
 }
 
 void BoundaryMap::clear() {

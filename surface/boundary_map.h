@@ -27,6 +27,9 @@ class BoundaryMap {
   void forget_before(Int3 next);
   void clear();
   std::size_t size() const { return map_.size(); }
+  /// The most boundaries that a map of such a grid holds after forget_before(next), with that of
+  /// `next`.
+  static std::uint64_t max_size(Int3 tiles);
 
  private:
   struct Expiry {

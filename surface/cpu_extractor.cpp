@@ -26,6 +26,18 @@ namespace {
 /// few enough for their samples and work spaces to stay in a core's cache.
 constexpr std::size_t kTilesPerThread = 8;
 
+/// Of a tile's boundary, mostly: few surfaces cross its upper x face so often that the lists of
+/// vertices there take more.
+std::uint64_t boundary_bytes_of_tile(bool drop_degenerate) {
+  // Any sample on a tile's six planes may be a coincident vertex.
+  constexpr std::uint64_t inner = kTileSamples - 2;
+  constexpr std::uint64_t planes = kTileSamples * kTileRows - inner * inner * inner;
+  return 3072 + (drop_degenerate ? planes * sizeof(CoincidentFace) : 0);
+}
+
+/// Edges of a tile: three from each sample.
+constexpr std::uint64_t kMaxEdges = std::uint64_t{3} * kTileRows * kTileSamples;
+
 /// A tile takes some 50 µs and a hand-off some 10: fewer tiles stay on one thread.
 constexpr std::size_t kWorthThreads = 6;
 
@@ -55,6 +67,8 @@ struct CpuExtractor::Impl {
         boundaries(l.tiles()),
         spaces(work_spaces ? std::move(work_spaces) : std::make_shared<TileWorkSpaces>()),
         states(spaces->states_) {
+    // An extraction of a larger budget may have left more.
+    if (states.size() > limits.tiles) states.resize(limits.tiles);
     options.roi = intersect(o.roi, l.box());
     if (std::isnan(o.isovalue)) throw UsageError("the isovalue is not a number");
     if (options.roi.empty()) throw UsageError("the region of interest holds no sample");
@@ -244,23 +258,23 @@ std::size_t CpuExtractor::preferred_batch(int threads) {
   return kTilesPerThread * static_cast<std::size_t>(threads);
 }
 
+// As if every edge of a tile had a vertex and every cell a triangle: any input fits. With the
+// boundary, which waits at least until the batch is over.
 std::uint64_t CpuExtractor::workspace_bytes(ScalarType type, bool drop_degenerate) {
   const std::uint64_t coincident =
       sizeof(CoincidentVertices) + kTileRows * kTileSamples * sizeof(CoincidentVertex);
-  return sizeof(TileState) + TileLayout::kSize * size_of(type) +
+  return sizeof(TileState) + boundary_bytes_of_tile(drop_degenerate) +
+         TileLayout::kSize * size_of(type) +
          kTileEdge * kTileEdge * kTileEdge * sizeof(ActiveCell) +
-         (drop_degenerate ? coincident : 0);
+         kMaxEdges * sizeof(std::uint32_t) + (drop_degenerate ? coincident : 0);
 }
 
-std::uint64_t CpuExtractor::boundary_bytes(bool drop_degenerate) {
-  // Any sample on a tile's six planes may be a coincident vertex.
-  constexpr std::uint64_t inner = kTileSamples - 2;
-  constexpr std::uint64_t planes = kTileSamples * kTileRows - inner * inner * inner;
-  return 3072 + (drop_degenerate ? planes * sizeof(CoincidentFace) : 0);
+std::uint64_t CpuExtractor::boundary_bytes(Int3 tiles, bool drop_degenerate) {
+  return BoundaryMap::max_size(tiles) * boundary_bytes_of_tile(drop_degenerate);
 }
 
 std::uint64_t CpuExtractor::max_tile_output(bool normals) {
-  return std::uint64_t{3} * kTileRows * kTileSamples * sizeof(Vec3f) * (normals ? 2 : 1) +
+  return kMaxEdges * sizeof(Vec3f) * (normals ? 2 : 1) +
          std::uint64_t{kMaxCaseTriangles} * kTileEdge * kTileEdge * kTileEdge * sizeof(Triangle);
 }
 

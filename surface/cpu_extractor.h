@@ -29,6 +29,9 @@ class TileWorkSpaces {
   TileWorkSpaces(const TileWorkSpaces&) = delete;
   TileWorkSpaces& operator=(const TileWorkSpaces&) = delete;
 
+  /// Work spaces that it holds: those of the last extractor's limit at most, when one begins.
+  std::size_t size() const { return states_.size(); }
+
  private:
   friend class CpuExtractor;
   std::vector<std::unique_ptr<TileState>> states_;
@@ -68,10 +71,10 @@ class CpuExtractor final : public SurfaceExtractor {
 
   /// Tiles between two hand-offs that keep `threads` busy and their caches warm.
   static std::size_t preferred_batch(int threads);
-  /// Bytes of work space for one tile.
+  /// Bytes of work space for one tile, with its boundary.
   static std::uint64_t workspace_bytes(ScalarType type, bool drop_degenerate);
-  /// Bytes of a finished tile that wait for later tiles, mostly.
-  static std::uint64_t boundary_bytes(bool drop_degenerate);
+  /// Bytes of finished tiles that wait for later tiles at most, mostly: of a grid of tiles.
+  static std::uint64_t boundary_bytes(Int3 tiles, bool drop_degenerate);
   /// Bytes of output that one tile can make at most.
   static std::uint64_t max_tile_output(bool normals);
 

@@ -49,13 +49,13 @@ HWY_AFTER_NAMESPACE();
 namespace isobrick::inline v0 {
 
 void count_tile(ScalarType type, const KernelContext& context, TileState& tile) {
-  static const auto best = ISOBRICK_BEST_OF(Count);
+  const auto best = ISOBRICK_BEST_OF(Count);
   best(type, context, tile);
 }
 
 void write_tile(ScalarType type, const KernelContext& context, TileState& tile, Vec3f* positions,
                 Vec3f* normals, Triangle* triangles) {
-  static const auto best = ISOBRICK_BEST_OF(Write);
+  const auto best = ISOBRICK_BEST_OF(Write);
   best(type, context, tile, positions, normals, triangles);
 }
 

@@ -34,12 +34,16 @@ class FolderStorage final : public Storage {
   std::string name() const override { return folder_.string(); }
   std::string name_of(const std::string& key) const override { return (folder_ / key).string(); }
   std::shared_ptr<const StoredObject> open(const std::string& key) const override {
-    return open_file_object(folder_ / key);
+    const fs::path path = folder_ / key;
+    std::error_code failure;
+    if (fs::is_directory(path, failure)) return nullptr;  // it may hold objects, but is none
+    return open_file_object(path);
   }
   std::vector<std::string> list(const std::string& folder) const override {
     const fs::path path = folder_ / folder;
     std::error_code failure;
-    if (fs::status(path, failure).type() == fs::file_type::not_found) return {};
+    const fs::file_type type = fs::status(path, failure).type();
+    if (type == fs::file_type::not_found || type == fs::file_type::regular) return {};
     std::vector<std::string> names;
     for (FolderEntry& entry : folder_entries(path)) names.push_back(std::move(entry.name));
     return names;

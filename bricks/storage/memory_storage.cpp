@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <utility>
 
+#include <isobrick/error.h>
 #include <isobrick/storage.h>
 #include "bricks/storage/storage_keys.h"
 
@@ -102,6 +103,8 @@ std::shared_ptr<const Storage> memory_storage(Objects objects, std::string name)
 }
 
 std::shared_ptr<const Storage> function_storage(StorageFunctions functions, std::string name) {
+  if (!functions.size || !functions.read)
+    throw UsageError("a storage of functions needs those for size and read");
   return std::make_shared<const FunctionStorage>(std::move(functions), std::move(name));
 }
 

@@ -18,7 +18,11 @@ bool is_zip(const fs::path& path) {
 }
 
 std::shared_ptr<const Storage> open_storage(const fs::path& path) {
-  if (fs::is_directory(path)) return folder_storage(path);
+  std::error_code failure;
+  const fs::file_status status = fs::status(path, failure);
+  if (status.type() == fs::file_type::none)
+    throw system_error("open", path.string(), failure.value());
+  if (fs::is_directory(status)) return folder_storage(path);
   if (is_zip(path)) return zip_storage(path);
   throw Error(fmt::format("'{}' is no store: neither a folder nor a zip", path.string()));
 }

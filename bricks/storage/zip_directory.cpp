@@ -174,14 +174,25 @@ class Numbers64 {
   Bytes numbers_;
 };
 
-bool leads_out(std::string_view name) {
-  if (name.empty() || name.front() == '/' || name.find('\0') != name.npos) return true;
+/// Whether `is_refused` holds of any part of a name between slashes.
+template <class F>
+bool any_part(std::string_view name, F&& is_refused) {
   for (std::size_t begin = 0; begin <= name.size();) {
     const std::size_t end = std::min(name.find('/', begin), name.size());
-    if (name.substr(begin, end - begin) == "..") return true;
+    if (is_refused(name.substr(begin, end - begin))) return true;
     begin = end + 1;
   }
   return false;
+}
+
+bool leads_out(std::string_view name) {
+  return name.empty() || name.front() == '/' || name.find('\0') != name.npos ||
+         any_part(name, [](std::string_view part) { return part == ".."; });
+}
+
+/// Keys have no such parts: the entry could be listed, but not be opened.
+bool is_no_key(std::string_view name) {
+  return any_part(name, [](std::string_view part) { return part.empty() || part == "."; });
 }
 
 ZipEntry::Form form_of(std::uint64_t flags, std::uint64_t method) {
@@ -231,7 +242,11 @@ ZipDirectory::ZipDirectory(const StoredObject& zip) {
   std::uint64_t count = 0;
   for (; !reader.at_end(); ++count) {
     ZipEntry entry = read_entry(zip, reader, begin_);
-    if (!entry.name.ends_with('/')) entries_.push_back(std::move(entry));
+    if (entry.name.ends_with('/')) continue;  // a folder
+    if (is_no_key(entry.name))
+      damaged(zip,
+              fmt::format("the name of its entry {} has an empty part or '.'", shown(entry.name)));
+    entries_.push_back(std::move(entry));
   }
   if (count != place.entries)
     damaged(zip, fmt::format("its directory lists {} entries, not {}", count, place.entries));

@@ -31,7 +31,8 @@ struct DeviceArray {
   ScalarType type = ScalarType::f32;  ///< of the samples
   Int3 extent = {};                   ///< samples along x, y, z
   /// Bytes from a sample to the next one along x, y, z, multiples of a sample, which may be
-  /// negative. All 0: without gaps, x fastest, which is C order of an array [z, y, x].
+  /// negative. All 0: without gaps, x fastest, which is C order of an array [z, y, x]. That along
+  /// an axis of one sample is ignored; along others 0 is refused.
   Int3 strides = {};
   Transform transform = {};  ///< index space to world space
   /// All work and all memory are of this stream (a cudaStream_t), which must outlive the meshes;

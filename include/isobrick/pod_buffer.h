@@ -1,7 +1,9 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <memory_resource>
+#include <new>
 #include <span>
 #include <type_traits>
 #include <utility>
@@ -31,6 +33,7 @@ ISOBRICK_API void free_memory(std::pmr::memory_resource* memory, void* data,
 template <class T>
 class PodBuffer {
   static_assert(std::is_trivially_copyable_v<T>);
+  static_assert(alignof(T) <= alignof(std::max_align_t), "memory of the process has no more");
 
  public:
   /// Empty, in memory of the process.
@@ -91,12 +94,15 @@ class PodBuffer {
   /// Makes room for so many elements. Throws std::bad_alloc.
   void reserve(std::size_t capacity) {
     if (capacity <= capacity_) return;
+    if (capacity > kMaxCapacity) throw std::bad_alloc();  // its bytes would wrap
     data_ = static_cast<T*>(detail::grow_memory(memory_, data_, size_ * sizeof(T),
                                                 capacity_ * sizeof(T), capacity * sizeof(T)));
     capacity_ = capacity;
   }
 
  private:
+  static constexpr std::size_t kMaxCapacity = PTRDIFF_MAX / sizeof(T);
+
   std::pmr::memory_resource* memory_ = nullptr;
   T* data_ = nullptr;
   std::size_t size_ = 0, capacity_ = 0;

@@ -80,11 +80,12 @@ struct StorageFunctions {
 };
 
 /// A storage of the caller's functions; what they throw reaches the reader. `name` is for messages.
+/// Throws UsageError where `size` or `read` is empty.
 ISOBRICK_API std::shared_ptr<const Storage> function_storage(StorageFunctions functions,
                                                              std::string name);
 
-/// A folder or a zip, whichever `path` is. Throws Error where it is neither, and what zip_storage()
-/// does.
+/// A folder or a zip, whichever `path` is. Throws Error where it is neither or cannot be looked at,
+/// and what zip_storage() does.
 ISOBRICK_API std::shared_ptr<const Storage> open_storage(const std::filesystem::path& path);
 
 }  // namespace isobrick

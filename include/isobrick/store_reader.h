@@ -94,7 +94,8 @@ class ISOBRICK_API StoreReader {
   /// checksum; nullopt when it is absent.
   std::optional<std::uint32_t> read_brick_unchecked(int level, Int3 b, std::byte* out) const;
 
-  /// Hints that brick `b` is read soon, as StoredObject::will_need().
+  /// Hints that brick `b` is read soon, as StoredObject::will_need(). Finds the brick first: reads
+  /// its shard's index where that is not cached, and throws as read_brick() does for its place.
   void will_need(int level, Int3 b) const;
 
   /// Bytes read from the storage so far (bricks, indices, ranges).
@@ -103,7 +104,7 @@ class ISOBRICK_API StoreReader {
   BrickTimes brick_times() const;
 
   /// Whether the level has both kinds of ranges, and checksums of its bricks. Without them no
-  /// surface can be extracted; `isobrick index` adds them.
+  /// surface can be extracted; `isobrick index` adds them. Throws UsageError for no such level.
   bool has_ranges(int level) const;
 
   /// Edge, in blocks, of the chunks in which block ranges are stored: reading

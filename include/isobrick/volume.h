@@ -19,7 +19,8 @@ struct Volume {
   ScalarType type = ScalarType::f32;  ///< of the samples, in native byte order
   Int3 extent = {};                   ///< samples along x, y, z
   /// Bytes from a sample to the next one along x, y, z, which may be negative. All 0: without gaps,
-  /// x fastest, which is C order of an array [z, y, x].
+  /// x fastest, which is C order of an array [z, y, x]. That along an axis of one sample is
+  /// ignored; along others 0 is refused.
   Int3 strides = {};
   Transform transform = {};            ///< index space to world space
   std::optional<double> nodata = {};   ///< samples of this value are missing

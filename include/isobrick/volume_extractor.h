@@ -21,12 +21,14 @@ namespace isobrick::inline v0 {
 /// Samples in memory are read in place. Those behind a function, or of a source with random access,
 /// are read box by box, each once with a layer or two of its neighbours'. One operation at a time.
 ///
-/// Of ExtractOptions, `level`, `index` and the members for a GPU do not matter; `inside` is above
-/// by default. `memory` bounds all but the mesh of an extraction into a Mesh.
+/// Of ExtractOptions, `index` and the budget of a GPU do not matter; `inside` is above by default.
+/// `level` other than 0 and Backend::cuda are refused. `memory` bounds all but the mesh of an
+/// extraction into a Mesh.
 class ISOBRICK_API VolumeExtractor {
  public:
-  /// Throws UsageError for a volume that makes no sense: no samples, an extent that is not positive
-  /// or overflows, strides of which one is 0.
+  /// Throws UsageError for a volume that makes no sense: no samples, an extent that is not
+  /// positive, overflows or exceeds 2²⁶ along an axis, a stride of 0 along an axis of several
+  /// samples.
   explicit VolumeExtractor(const Volume& volume);
   /// Of a source, which must outlive it. Throws UsageError for one without random access.
   explicit VolumeExtractor(VolumeSource& source);
@@ -34,17 +36,18 @@ class ISOBRICK_API VolumeExtractor {
   /// Takes the ranges of another.
   VolumeExtractor(VolumeExtractor&&) noexcept;
 
-  /// Streams a surface into `sink` (begin … finish). Throws UsageError for a region or an isovalue
-  /// that makes no sense and a budget that is too small, what the sink, `read` and the progress
-  /// throw.
+  /// Streams a surface into `sink` (begin … finish). Throws UsageError for a region, a transform or
+  /// an isovalue that makes no sense and a budget that is too small, what the sink, `read` and the
+  /// progress throw.
   SurfaceReport extract(const ExtractOptions& options, MeshSink& sink,
                         Progress& progress = no_progress());
-  /// Puts a welded surface in place of what `mesh` held, in its memory where that is enough.
+  /// Puts a welded surface in place of what `mesh` held, in its memory where that is enough. After
+  /// an exception the mesh is empty or as it was; its memory and resource are still its own.
   SurfaceReport extract(const ExtractOptions& options, Mesh& mesh,
                         Progress& progress = no_progress());
 
-  /// The smallest and the largest sample, missing ones left out. Nothing before the first
-  /// extraction, and where that was of a region.
+  /// The smallest and the largest sample, missing ones left out. nullopt before all samples were
+  /// scanned (the first extraction without a region does), and where all are missing.
   std::optional<ValueRange<double>> range() const;
 
  private:

@@ -118,7 +118,7 @@ File open_input(const std::filesystem::path& path) {
 File open_if_exists(const std::filesystem::path& path) {
   UniqueFd fd = open_to_read(path);
   if (fd.get() >= 0) return require_regular({std::move(fd), path});
-  if (errno == ENOENT) return {};
+  if (errno == ENOENT || errno == ENOTDIR) return {};
   if (errno == ENXIO) throw not_regular(path);  // a socket, or a device that is not there
   throw system_error("open", path.string(), errno);
 }

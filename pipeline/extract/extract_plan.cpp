@@ -38,12 +38,10 @@ std::uint64_t tile_output(PassRequests requests) {
       requests.begin(), requests.end(), [](const ExtractRequest& r) { return r.surface.normals; }));
 }
 
-/// The boundaries that wait between finished and unfinished tiles: in Morton order at
-/// most about those on the three upper faces of the tile grid.
+/// The boundaries that wait between finished and unfinished tiles.
 std::uint64_t boundary_bytes(PassRequests requests) {
-  const Int3 t = common(requests).level->lattice.tiles();
-  const auto faces = static_cast<std::uint64_t>(t.x * t.y + t.y * t.z + t.x * t.z);
-  return requests.size() * faces * CpuExtractor::boundary_bytes(any_drops(requests));
+  return requests.size() *
+         CpuExtractor::boundary_bytes(common(requests).level->lattice.tiles(), any_drops(requests));
 }
 
 /// What the CUDA driver and its context take of the host's memory.

@@ -25,9 +25,8 @@ MeshBounds world_bounds(const Transform& transform, Int3 first, Int3 last) {
   return bounds;
 }
 
-}  // namespace
-
-void check_coordinates(const Transform& transform, Int3 extent, const std::string& name) {
+/// Empty where the coordinates of a mesh fit 32 bits; else what is wrong.
+std::string misfit(const Transform& transform, Int3 extent, const std::string& name) {
   // Coordinates are float, and so are the factors of positions and normals.
   constexpr double least = 1e-30, most = 1e30;
   const auto fits = [](double v, double lo) { return std::abs(v) >= lo && std::abs(v) <= most; };
@@ -37,11 +36,22 @@ void check_coordinates(const Transform& transform, Int3 extent, const std::strin
   for (int axis = 0; axis < 3; ++axis)
     fit = fit && fits(transform.spacing[axis], least) && fits(transform.origin[axis], 0) &&
           fits(far[axis], 0);
-  if (!fit)
-    throw Error(fmt::format(
-        "the spacing or origin of {} does not fit the 32-bit coordinates of a mesh (1e-30 to "
-        "1e30); convert it with another --spacing, --origin or unit",
-        name));
+  if (fit) return {};
+  return fmt::format(
+      "the spacing or origin of {} does not fit the 32-bit coordinates of a mesh (1e-30 to 1e30)",
+      name);
+}
+
+}  // namespace
+
+void check_coordinates(const Transform& transform, Int3 extent, const std::string& name) {
+  const std::string wrong = misfit(transform, extent, name);
+  if (!wrong.empty()) throw Error(wrong + "; convert it with another --spacing, --origin or unit");
+}
+
+void check_transform(const Transform& transform, Int3 extent, const std::string& name) {
+  const std::string wrong = misfit(transform, extent, name);
+  if (!wrong.empty()) throw UsageError(wrong + "; give another transform");
 }
 
 void check_roi(Box3 roi, Int3 extent) {

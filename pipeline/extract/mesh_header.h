@@ -8,8 +8,10 @@
 
 namespace isobrick::inline v0 {
 
-/// Throws Error where the coordinates of a mesh do not fit 32 bits: `name` is of the volume.
+/// Throws Error where the coordinates of a mesh do not fit 32 bits: `name` is of the store.
 void check_coordinates(const Transform& transform, Int3 extent, const std::string& name);
+/// The same for samples without a store, `name`, whose transform is the caller's: UsageError.
+void check_transform(const Transform& transform, Int3 extent, const std::string& name);
 
 /// Throws UsageError for a region that is empty or leaves the samples of `extent`.
 void check_roi(Box3 roi, Int3 extent);

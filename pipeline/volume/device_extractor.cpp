@@ -24,7 +24,7 @@ DeviceArray checked(DeviceArray array) {
                                    "xyz"[axis], bytes));
   if (reinterpret_cast<std::uintptr_t>(array.samples) % static_cast<std::uintptr_t>(bytes) != 0)
     throw UsageError("the samples are not aligned as their type");
-  check_coordinates(array.transform, array.extent, "the array");
+  check_transform(array.transform, array.extent, "the array");
   return array;
 }
 

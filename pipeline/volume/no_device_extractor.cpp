@@ -6,7 +6,7 @@
 namespace isobrick::inline v0 {
 namespace {
 
-[[noreturn]] void refuse() { throw Error("this isobrick was built without CUDA"); }
+[[noreturn]] void refuse_device() { throw Error("this isobrick was built without CUDA"); }
 
 }  // namespace
 
@@ -17,15 +17,15 @@ struct DeviceMesh::Impl {};
 PendingDeviceMesh::PendingDeviceMesh(std::unique_ptr<Impl>) {}
 PendingDeviceMesh::~PendingDeviceMesh() = default;
 PendingDeviceMesh::PendingDeviceMesh(PendingDeviceMesh&&) noexcept = default;
-bool PendingDeviceMesh::is_ready() const { refuse(); }
-DeviceMesh PendingDeviceMesh::get() { refuse(); }
+bool PendingDeviceMesh::is_ready() const { refuse_device(); }
+DeviceMesh PendingDeviceMesh::get() { refuse_device(); }
 
-DeviceExtractor::DeviceExtractor(const DeviceArray&) { refuse(); }
+DeviceExtractor::DeviceExtractor(const DeviceArray&) { refuse_device(); }
 DeviceExtractor::~DeviceExtractor() = default;
 DeviceExtractor::DeviceExtractor(DeviceExtractor&&) noexcept = default;
-DeviceMesh DeviceExtractor::extract(const ExtractOptions&) { refuse(); }
-PendingDeviceMesh DeviceExtractor::extract_async(const ExtractOptions&) { refuse(); }
-DeviceMesh extract(const DeviceArray&, const ExtractOptions&) { refuse(); }
+DeviceMesh DeviceExtractor::extract(const ExtractOptions&) { refuse_device(); }
+PendingDeviceMesh DeviceExtractor::extract_async(const ExtractOptions&) { refuse_device(); }
+DeviceMesh extract(const DeviceArray&, const ExtractOptions&) { refuse_device(); }
 
 DeviceMesh::DeviceMesh() = default;
 DeviceMesh::DeviceMesh(std::shared_ptr<const Impl>) {}

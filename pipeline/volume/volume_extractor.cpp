@@ -37,7 +37,8 @@ SurfaceReport VolumeExtractor::extract(const ExtractOptions& options, Mesh& mesh
 
 std::optional<ValueRange<double>> VolumeExtractor::range() const {
   if (!impl_->samples.is_known(impl_->samples.all_tiles())) return std::nullopt;
-  return impl_->samples.ranges->all();
+  const ValueRange<double> all = impl_->samples.ranges->all();
+  return all.empty() ? std::nullopt : std::optional(all);
 }
 
 Mesh extract(const Volume& volume, const ExtractOptions& options, Progress& progress) {

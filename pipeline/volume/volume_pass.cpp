@@ -6,12 +6,15 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <new>
+#include <optional>
 #include <span>
 #include <utility>
 
 #include <isobrick/error.h>
 #include "core/box_union.h"
 #include "core/length_unit.h"
+#include "core/machine_memory.h"
 #include "core/morton.h"
 #include "pipeline/extract/mesh_header.h"
 #include "pipeline/program_memory.h"
@@ -25,6 +28,10 @@ constexpr Index kMaxRegion = 4;
 /// Regions between two reports of progress, and tiles.
 constexpr std::size_t kRegionsAtOnce = 64;
 constexpr std::size_t kTilesAtOnce = 2048;
+/// Bytes of lists for each tile: first one of regions to scan, then one of active tiles.
+constexpr std::uint64_t kListedTile = std::max(sizeof(Box3), sizeof(TileWork));
+/// Triangles number no more vertices.
+constexpr std::uint64_t kMaxVertices = std::uint64_t{1} << 32;
 /// Larger chunks of a mesh gain nothing.
 constexpr std::uint64_t kMaxOutput = std::uint64_t{32} << 20;
 
@@ -36,8 +43,10 @@ Box3 samples_of(Box3 tiles, Index reach, const Lattice& lattice) {
 
 /// The boxes of `edge` that a box of tiles meets, cut at it, x fastest.
 std::vector<Box3> cut(Box3 tiles, Int3 edge) {
+  const Box3 grid{floor_div(tiles.lo, edge), ceil_div(tiles.hi, edge)};
   std::vector<Box3> parts;
-  for_each_point({floor_div(tiles.lo, edge), ceil_div(tiles.hi, edge)}, [&](Int3 p) {
+  parts.reserve(static_cast<std::size_t>(volume(grid.extent())));  // no more, the budget has it
+  for_each_point(grid, [&](Int3 p) {
     parts.push_back(intersect({p * edge, (p + kOne) * edge}, tiles));
   });
   return parts;
@@ -49,23 +58,55 @@ Box3 blocks_of(Box3 tiles, const Lattice& lattice) {
   return intersect({tiles.lo * blocks, tiles.hi * blocks}, {{0, 0, 0}, lattice.blocks()});
 }
 
-/// Makes room for `count` elements, in large pages unless one of these is more than that.
+/// Makes room for `count` elements, in large pages unless one of these is more than that. An array
+/// that was used before grows where it must.
 template <class T>
 void reserve(std::size_t count, PodBuffer<T>& buffer) {
   constexpr std::size_t worth = detail::kLargeMemory / 8 / sizeof(T);
   constexpr std::size_t large = detail::kLargeMemory / sizeof(T) + 1;
-  buffer.reserve(count < worth ? count : std::max(count, large));
+  if (buffer.capacity() == 0) buffer.reserve(count < worth ? count : std::max(count, large));
 }
 
 /// Makes room for the mesh of so many active blocks, as smooth surfaces have it. In memory of the
 /// process this takes addresses only, until the mesh is written; of a resource it would take all.
 void reserve(std::size_t blocks, bool normals, Mesh& mesh) {
   constexpr std::size_t vertices = 1024, triangles = 2048;
+  constexpr std::size_t bytes = 2 * vertices * sizeof(Vec3f) + triangles * sizeof(Triangle);
   if (mesh.positions.memory()) return;
-  reserve(blocks * vertices, mesh.positions);
-  if (normals) reserve(blocks * vertices, mesh.normals);
-  reserve(blocks * triangles, mesh.triangles);
+  static const std::uint64_t allowed = allowed_memory();
+  blocks = static_cast<std::size_t>(
+      std::min({std::uint64_t{blocks}, kMaxVertices / vertices, allowed / 2 / bytes}));
+  try {
+    reserve(blocks * vertices, mesh.positions);
+    if (normals) reserve(blocks * vertices, mesh.normals);
+    reserve(blocks * triangles, mesh.triangles);
+  } catch (const std::bad_alloc&) {
+    // The system gives no more addresses at once: the mesh may be far smaller.
+  }
 }
+
+/// A mesh that is another's for a while. It goes back whatever happens, without its elements unless
+/// it is complete: an exception must not cost its owner the memory.
+class LentMesh {
+ public:
+  LentMesh(Mesh& owner, Mesh& user) : owner_(owner), user_(user) {
+    user_ = std::move(owner_);
+    user_.clear();
+  }
+  ~LentMesh() {
+    if (!is_complete_) user_.clear();
+    owner_ = std::move(user_);
+  }
+  LentMesh(const LentMesh&) = delete;
+  LentMesh& operator=(const LentMesh&) = delete;
+
+  void complete() { is_complete_ = true; }
+
+ private:
+  Mesh& owner_;
+  Mesh& user_;
+  bool is_complete_ = false;
+};
 
 std::size_t count_blocks(const std::vector<TileWork>& tiles) {
   std::size_t blocks = 0;
@@ -79,7 +120,8 @@ std::size_t count_blocks(const std::vector<TileWork>& tiles) {
 VolumePass::VolumePass(VolumeSamples& samples, const ExtractOptions& options, Indexing indexing,
                        std::shared_ptr<TileWorkSpaces> spaces)
     : samples_(samples),
-      budget_(options.memory - std::min(options.memory, options.memory_of_others)),
+      memory_(options.memory),
+      others_(options.memory_of_others),
       workers_(options.threads),
       spaces_(std::move(spaces)) {
   const Lattice& lattice = samples.lattice;
@@ -88,7 +130,7 @@ VolumePass::VolumePass(VolumeSamples& samples, const ExtractOptions& options, In
   if (std::isnan(options.isovalue)) throw UsageError("the isovalue is not a number");
   if (options.backend == Backend::cuda)
     throw UsageError("samples in host memory are extracted on the CPU");
-  check_coordinates(samples.transform, lattice.extent, "the volume");
+  check_transform(samples.transform, lattice.extent, "the volume");
   surface_ = {.isovalue = options.isovalue,
               .inside = options.inside.value_or(Inside::above),
               .normals = options.normals,
@@ -99,11 +141,21 @@ VolumePass::VolumePass(VolumeSamples& samples, const ExtractOptions& options, In
   check_roi(surface_.roi, lattice.extent);
 }
 
+/// What every extraction takes besides its surface and its regions.
+std::uint64_t VolumePass::fixed_bytes() const {
+  const Lattice& lattice = samples_.lattice;
+  const auto tiles = static_cast<std::uint64_t>(volume(lattice.tiles()));
+  const bool in_place =
+      samples_.array ? samples_.array->in_place() != nullptr : !samples_.missing.any();
+  const std::uint64_t scans =
+      in_place ? 0 : static_cast<std::uint64_t>(workers_.threads()) * range_scan_bytes(lattice);
+  return samples_.source_bytes + samples_.range_bytes() + tiles * kListedTile + scans +
+         CpuExtractor::boundary_bytes(lattice.tiles(), surface_.drop_degenerate);
+}
+
 /// Divides the budget among the ranges, what waits between tiles, work spaces, output and regions.
 void VolumePass::plan(bool has_sink, std::uint64_t sink_bytes) {
   const Lattice& lattice = samples_.lattice;
-  const Int3 t = lattice.tiles();
-  const auto faces = static_cast<std::uint64_t>(t.x * t.y + t.y * t.z + t.x * t.z);
   const std::uint64_t workspace =
       CpuExtractor::workspace_bytes(lattice.type, surface_.drop_degenerate);
   const std::uint64_t tile_output = CpuExtractor::max_tile_output(surface_.normals);
@@ -112,16 +164,15 @@ void VolumePass::plan(bool has_sink, std::uint64_t sink_bytes) {
     const Int3 n = min(kOne * (edge * kTileEdge + 3), lattice.extent);
     return 2 * static_cast<std::uint64_t>(volume(n)) * size_of(samples_.read_type);
   };
-  const std::uint64_t fixed = sink_bytes + volume_ranges_bytes(lattice) +
-                              faces * CpuExtractor::boundary_bytes(surface_.drop_degenerate);
   const std::uint64_t least =
-      fixed + workspace + region_bytes(1) + (has_sink ? 2 * tile_output : 0);
-  if (budget_ < least)
+      sink_bytes + fixed_bytes() + workspace + region_bytes(1) + (has_sink ? 2 * tile_output : 0);
+  if (memory_ < least || memory_ - least < others_)
     throw UsageError(fmt::format(
         "a memory budget of {:.1f} MiB is too small for this volume: at least {} MiB are needed",
-        in_mib(budget_), mib_above(least)));
+        in_mib(memory_), mib_above(least + others_)));
+  samples_.make_ranges();
   // Half of what is left for the regions and the output, half for work spaces.
-  std::uint64_t left = budget_ - least;
+  std::uint64_t left = memory_ - least - others_;
   const std::uint64_t tiles = std::min<std::uint64_t>(
       CpuExtractor::preferred_batch(workers_.threads()), 1 + left / 2 / workspace);
   left -= (tiles - 1) * workspace;
@@ -176,6 +227,7 @@ void VolumePass::find_ranges(Progress& progress) {
 
 std::vector<TileWork> VolumePass::active_tiles() const {
   std::vector<TileWork> tiles;
+  tiles.reserve(static_cast<std::size_t>(volume(samples_.lattice.tiles())));
   samples_.ranges->append_tiles(samples_.all_tiles(), surface_.isovalue, tiles);
   const Box3 roi = tiles_of_roi();
   std::erase_if(tiles, [&](const TileWork& work) { return !roi.contains(work.tile); });
@@ -200,35 +252,41 @@ void VolumePass::extract_array(CpuExtractor& extractor, Progress& progress) {
   progress.end();
 }
 
-/// Reads the regions that may have a part of the surface, in Morton order.
-void VolumePass::extract_regions(CpuExtractor& extractor, Progress& progress) {
-  const Index edge = region_tiles_;
-  std::vector<Box3> regions;
-  for_each_morton(ceil_div(samples_.lattice.tiles(), kOne * edge), [&](Int3 p) {
-    const Box3 tiles = intersect({p * edge, (p + kOne) * edge}, tiles_of_roi());
+/// Calls f(tiles) for the regions that may have a part of the surface, in Morton order.
+template <class F>
+void VolumePass::for_each_region(F&& f) const {
+  const Int3 edge = kOne * region_tiles_;
+  std::vector<TileWork> active;
+  for_each_morton(ceil_div(samples_.lattice.tiles(), edge), [&](Int3 p) {
+    const Box3 region{p * edge, (p + kOne) * edge};
+    const Box3 tiles = intersect(region, tiles_of_roi());
     if (tiles.empty()) return;
-    std::vector<TileWork> active;
-    if (samples_.is_known(tiles)) {
-      samples_.ranges->append_tiles({p * edge, (p + kOne) * edge}, surface_.isovalue, active);
-      if (active.empty()) return;
-    }
-    regions.push_back(tiles);
+    active.clear();
+    const bool is_known = samples_.is_known(tiles);
+    if (is_known) samples_.ranges->append_tiles(region, surface_.isovalue, active);
+    if (!is_known || !active.empty()) f(tiles);
   });
+}
+
+/// Reads a region while the one before is extracted.
+void VolumePass::extract_regions(CpuExtractor& extractor, Progress& progress) {
   std::uint64_t bytes = 0;
-  for (const Box3& tiles : regions) bytes += sample_bytes(tiles);
+  for_each_region([&](Box3 tiles) { bytes += sample_bytes(tiles); });
   progress.begin("extracting", bytes);
   RegionReader reader(samples_.read, samples_.concurrent, samples_.read_type, workers_);
   const Index reach = sample_reach(surface_);
-  const auto begin = [&](std::size_t i) {
-    if (i < regions.size()) reader.begin(samples_of(regions[i], reach, samples_.lattice));
+  std::optional<Box3> reading;
+  const auto proceed = [&](std::optional<Box3> next) {
+    const std::optional<SampleArray> read = reading ? std::optional(reader.take()) : std::nullopt;
+    if (next) reader.begin(samples_of(*next, reach, samples_.lattice));
+    if (read) {
+      extract_region(extractor, *read, *reading);
+      progress.advance(sample_bytes(*reading));
+    }
+    reading = next;
   };
-  begin(0);
-  for (std::size_t i = 0; i < regions.size(); ++i) {
-    const SampleArray read = reader.take();
-    begin(i + 1);
-    extract_region(extractor, read, regions[i]);
-    progress.advance(sample_bytes(regions[i]));
-  }
+  for_each_region(proceed);
+  proceed(std::nullopt);
   progress.end();
 }
 
@@ -283,11 +341,12 @@ SurfaceReport VolumePass::run(Mesh& mesh, Progress& progress) {
   plan(false, 0);
   prepare(progress);
   CpuExtractor extractor(samples_.lattice, surface_, limits_, nullptr, spaces_);
-  extractor.mesh() = std::move(mesh);
-  extractor.mesh().clear();
-  reserve(count_blocks(tiles_), surface_.normals, extractor.mesh());
-  extract(extractor, progress);
-  mesh = std::move(extractor.mesh());
+  {
+    LentMesh lent(mesh, extractor.mesh());
+    reserve(count_blocks(tiles_), surface_.normals, extractor.mesh());
+    extract(extractor, progress);
+    lent.complete();
+  }
   mesh.unit = unit_name(samples_.transform.unit);
   return extractor.report();
 }

@@ -23,6 +23,7 @@ class VolumePass {
 
  private:
   void plan(bool has_sink, std::uint64_t sink_bytes);
+  std::uint64_t fixed_bytes() const;
   Box3 tiles_of_roi() const;
   std::uint64_t sample_bytes(Box3 tiles) const;
   void find_ranges(Progress& progress);
@@ -31,12 +32,14 @@ class VolumePass {
   void prepare(Progress& progress);
   void extract(CpuExtractor& extractor, Progress& progress);
   void extract_array(CpuExtractor& extractor, Progress& progress);
+  template <class F>
+  void for_each_region(F&& f) const;
   void extract_regions(CpuExtractor& extractor, Progress& progress);
   void extract_region(CpuExtractor& extractor, const SampleArray& read, Box3 tiles);
 
   VolumeSamples& samples_;
   SurfaceOptions surface_;
-  std::uint64_t budget_;
+  std::uint64_t memory_, others_;  ///< the budget, and what others take of it
   Workers workers_;
   std::shared_ptr<TileWorkSpaces> spaces_;
   ExtractorLimits limits_;

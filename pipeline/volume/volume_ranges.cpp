@@ -13,6 +13,13 @@ namespace isobrick::inline v0 {
 namespace {
 
 constexpr Index kBlocksOfTile = kTileEdge / kBlockEdge;
+/// Blocks in a row whose samples are copied at a time, where they can't be read in place.
+constexpr Index kBlocksOfCopy = 8;
+
+/// The samples that the cells of a box of blocks touch.
+Box3 samples_of_blocks(Box3 blocks, const Lattice& lattice) {
+  return intersect({blocks.lo * kBlockEdge, blocks.hi * kBlockEdge + Int3{1, 1, 1}}, lattice.box());
+}
 
 /// The same point with its coordinates in the order of `axes`.
 Int3 permute(Int3 p, const std::array<int, 3>& axes) {
@@ -29,9 +36,8 @@ class TypedVolumeRanges final : public VolumeRanges {
   }
 
   void scan(const ArraySamples& samples, Box3 blocks) override {
-    const Box3 box =
-        intersect({blocks.lo * kBlockEdge, blocks.hi * kBlockEdge + Int3{1, 1, 1}}, lattice_.box());
     if (const SampleArray* array = samples.in_place()) {
+      const Box3 box = samples_of_blocks(blocks, lattice_);
       const auto& axes = samples.axes();
       const Int3 strides = permute(array->strides, axes);
       constexpr auto size = static_cast<Index>(sizeof(T));
@@ -40,10 +46,17 @@ class TypedVolumeRanges final : public VolumeRanges {
             strides.y / size, strides.z / size});
       return;
     }
+    Int3 edge{1, 1, 1};
+    edge[samples.axes()[0]] = kBlocksOfCopy;  // long rows: memory is read in order
     PodBuffer<T> dense;
-    dense.resize(static_cast<std::size_t>(volume(box.extent())));
-    samples.copy(box, reinterpret_cast<std::byte*>(dense.data()));
-    scan(blocks, {0, 1, 2}, SampleBlock<T>::dense(dense.data(), box.extent()));
+    for_each_point({{0, 0, 0}, ceil_div(blocks.extent(), edge)}, [&](Int3 p) {
+      const Int3 lo = blocks.lo + p * edge;
+      const Box3 part{lo, min(lo + edge, blocks.hi)};
+      const Box3 box = samples_of_blocks(part, lattice_);
+      dense.resize(static_cast<std::size_t>(volume(box.extent())));
+      samples.copy(box, reinterpret_cast<std::byte*>(dense.data()));
+      scan(part, {0, 1, 2}, SampleBlock<T>::dense(dense.data(), box.extent()));
+    });
   }
 
   void append_tiles(Box3 tiles, double isovalue, std::vector<TileWork>& out) const override {
@@ -71,11 +84,19 @@ class TypedVolumeRanges final : public VolumeRanges {
     return ranges_[static_cast<std::size_t>(linear_index(b, blocks_))];
   }
 
+  /// Blocks with cells. An axis of one sample has none, but its samples count for all().
+  Int3 scanned_blocks(Int3 samples, const std::array<int, 3>& axes) const {
+    Int3 grid = leaf_grid(samples, kBlockEdge);
+    for (int i = 0; i < 3; ++i)
+      if (lattice_.extent[axes[static_cast<std::size_t>(i)]] == 1) grid[i] = 1;
+    return grid;
+  }
+
   /// `samples` has the axes in the order of `axes`.
   void scan(Box3 blocks, const std::array<int, 3>& axes, const SampleBlock<T>& samples) {
     ColumnRanges<T> columns;
     bool has_nan = false;
-    const Int3 n = samples.extent, grid = leaf_grid(n, kBlockEdge);
+    const Int3 n = samples.extent, grid = scanned_blocks(n, axes);
     const auto last = [](Index i, Index size) { return std::min((i + 1) * kBlockEdge + 1, size); };
     for (Index z = 0; z < grid.z; ++z)
       for (Index y = 0; y < grid.y; ++y) {
@@ -110,6 +131,12 @@ std::unique_ptr<VolumeRanges> make_volume_ranges(const Lattice& lattice) {
   return visit_scalar(lattice.type, [&](auto tag) -> std::unique_ptr<VolumeRanges> {
     return std::make_unique<TypedVolumeRanges<typename decltype(tag)::type>>(lattice);
   });
+}
+
+std::uint64_t range_scan_bytes(const Lattice& lattice) {
+  constexpr Index edge = kBlockEdge + 1;
+  return static_cast<std::uint64_t>((kBlocksOfCopy * kBlockEdge + 1) * edge * edge) *
+         lattice.sample_bytes();
 }
 
 std::uint64_t volume_ranges_bytes(const Lattice& lattice) {

@@ -29,6 +29,9 @@ class VolumeRanges {
 
 std::unique_ptr<VolumeRanges> make_volume_ranges(const Lattice& lattice);
 
+/// Bytes that VolumeRanges::scan() takes on each thread for samples that are not read in place.
+std::uint64_t range_scan_bytes(const Lattice& lattice);
+
 /// Bytes of the ranges of a volume.
 std::uint64_t volume_ranges_bytes(const Lattice& lattice);
 

@@ -2,9 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <utility>
 
 #include <isobrick/error.h>
+#include <isobrick/level_info.h>
 
 namespace isobrick::inline v0 {
 
@@ -13,13 +15,19 @@ void check_extent(Int3 extent) {
     throw UsageError(
         fmt::format("an extent of {}×{}×{} samples is none, or more than 64 bits count", extent.x,
                     extent.y, extent.z));
+  if (std::max({extent.x, extent.y, extent.z}) > kMaxAxisSamples)
+    throw UsageError(
+        fmt::format("an extent of {}×{}×{} samples: more than {} along an axis are not supported",
+                    extent.x, extent.y, extent.z, kMaxAxisSamples));
 }
 
 Int3 resolve_strides(Int3 strides, Int3 extent, Index bytes, const char* what) {
   if (strides == Int3{0, 0, 0}) return {bytes, bytes * extent.x, bytes * extent.x * extent.y};
-  for (int axis = 0; axis < 3; ++axis)
-    if (strides[axis] == 0 && extent[axis] > 1)
+  for (int axis = 0; axis < 3; ++axis) {
+    if (extent[axis] == 1) strides[axis] = bytes;
+    if (strides[axis] == 0)
       throw UsageError(fmt::format("the stride of the {} along {} is 0", what, "xyz"[axis]));
+  }
   return strides;
 }
 
@@ -44,8 +52,6 @@ VolumeSamples::VolumeSamples(const Volume& volume) : transform(volume.transform)
   read = volume.read;
   concurrent = volume.concurrent_reads;
   read_type = volume.type;
-  ranges = make_volume_ranges(lattice);
-  known.resize(static_cast<std::size_t>(isobrick::volume(lattice.tiles())));
 }
 
 VolumeSamples::VolumeSamples(VolumeSource& source)
@@ -53,17 +59,27 @@ VolumeSamples::VolumeSamples(VolumeSource& source)
       transform(source.info().transform),
       read([&source](Box3 box, std::byte* out) { source.read(box, out); }),
       concurrent(source.parallel()),
-      read_type(source.info().type) {
+      read_type(source.info().type),
+      source_bytes(source.memory()) {
   check_extent(lattice.extent);
   if (!source.random_access())
     throw UsageError(
         fmt::format("{} can be read only once from its begin to its end; convert it first",
                     source.info().name));
-  ranges = make_volume_ranges(lattice);
+}
+
+std::uint64_t VolumeSamples::range_bytes() const {
+  return volume_ranges_bytes(lattice) + static_cast<std::uint64_t>(volume(lattice.tiles())) / 8;
+}
+
+void VolumeSamples::make_ranges() {
+  if (ranges) return;
   known.resize(static_cast<std::size_t>(volume(lattice.tiles())));
+  ranges = make_volume_ranges(lattice);
 }
 
 bool VolumeSamples::is_known(Box3 tiles) const {
+  if (!ranges) return false;
   bool all = true;
   for_each_point(tiles, [&](Int3 t) {
     all = all && known[static_cast<std::size_t>(linear_index(t, lattice.tiles()))];

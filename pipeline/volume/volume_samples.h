@@ -12,10 +12,12 @@
 
 namespace isobrick::inline v0 {
 
-/// Throws UsageError where it is not positive or overflows.
+/// Throws UsageError where it is not positive, overflows or exceeds kMaxAxisSamples: what stores
+/// refuse too.
 void check_extent(Int3 extent);
-/// The strides as given, or those of samples without gaps where all are 0. Throws UsageError where
-/// one is; `what` they are of.
+/// The strides as given, or those of samples without gaps where all are 0. `bytes` along an axis of
+/// one sample, so that it never keeps samples from being read in place. Throws UsageError where
+/// another is 0; `what` they are of.
 Int3 resolve_strides(Int3 strides, Int3 extent, Index bytes, const char* what);
 
 /// A volume that is extracted without a store: where its samples are, and what is known of them.
@@ -28,13 +30,20 @@ struct VolumeSamples {
   RegionReader::Read read;
   bool concurrent = false;
   ScalarType read_type = ScalarType::u8;
+  std::uint64_t source_bytes = 0;  ///< VolumeSource::memory()
 
-  std::unique_ptr<VolumeRanges> ranges;
-  std::vector<bool> known;  ///< of each tile, C order: whether its ranges are found
+  std::unique_ptr<VolumeRanges> ranges;  ///< null before make_ranges()
+  std::vector<bool> known;               ///< of each tile, C order: whether its ranges are found
 
   /// Throw UsageError for what VolumeExtractor refuses.
   explicit VolumeSamples(const Volume& volume);
   explicit VolumeSamples(VolumeSource& source);
+
+  /// Bytes that make_ranges() takes.
+  std::uint64_t range_bytes() const;
+  /// Makes room for what is found of the samples. Not done by the constructor: a budget comes
+  /// first.
+  void make_ranges();
 
   bool is_known(Box3 tiles) const;
   void set_known(Box3 tiles);

@@ -31,7 +31,7 @@ inline void copy_box(const std::byte* from, Int3 extent, std::size_t sample, Box
 
 /// A volume in memory that counts what is read of it, can refuse random access
 /// and can fail after so many bytes.
-class MemorySource final : public VolumeSource {
+class MemorySource : public VolumeSource {
  public:
   MemorySource(const MemorySource& other)
       : info_(other.info_), samples_(other.samples_), random_access_(other.random_access_) {}

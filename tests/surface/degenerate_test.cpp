@@ -94,7 +94,8 @@ TEST(DropDegenerateAt, BoundariesAreNoLargerThanTheirBound) {
   publish_coincident(tile);
   EXPECT_EQ(boundary.coincident.size(), 33u * 33 * 33 - 31 * 31 * 31);
   EXPECT_LE(boundary.coincident.capacity() * sizeof(CoincidentFace),
-            CpuExtractor::boundary_bytes(true) - CpuExtractor::boundary_bytes(false));
+            CpuExtractor::boundary_bytes({1, 1, 1}, true) -
+                CpuExtractor::boundary_bytes({1, 1, 1}, false));
 }
 
 // Where eight tiles meet, whoever of them has the first triangle.

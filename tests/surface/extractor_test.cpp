@@ -4,6 +4,7 @@
 #include <numbers>
 
 #include <isobrick/error.h>
+#include "core/morton.h"
 #include "surface/case_tables.h"
 #include "tests/surface/field.h"
 
@@ -428,6 +429,29 @@ TEST(Extractor, ARegionOfInterestIsThatPartOfTheMesh) {
     for (const Triangle& t : mesh.triangles) used.insert(t.begin(), t.end());
     EXPECT_EQ(used.size(), mesh.positions.size());
   }
+}
+
+// Work spaces that extractors share are those of the budget of the last one.
+TEST(Extractor, WorkSpacesFollowTheLimit) {
+  const auto field = padded_noise<std::uint8_t>({100, 70, 70}, 0, 100, std::uint8_t{0}, 3);
+  const Lattice lattice{field.extent, {64, 64, 64}, ScalarType::u8};
+  const DenseBricks bricks(lattice, field.samples.data());
+  const SurfaceOptions options{.isovalue = 50, .roi = lattice.box()};
+  std::vector<TileWork> tiles;
+  for_each_morton(lattice.tiles(), [&](Int3 tile) { tiles.push_back({tile, 0xff}); });
+  const auto spaces = std::make_shared<TileWorkSpaces>();
+  std::vector<Triangle> first;
+  for (const std::size_t limit : {20, 3, 7}) {
+    CpuExtractor extractor(lattice, options, {.tiles = limit}, nullptr, spaces);
+    EXPECT_LE(spaces->size(), limit);
+    extractor.extract(tiles, bricks, nullptr);
+    EXPECT_LE(spaces->size(), limit);
+    const std::vector<Triangle> made(extractor.mesh().triangles.begin(),
+                                     extractor.mesh().triangles.end());
+    if (first.empty()) first = made;
+    EXPECT_EQ(made, first);
+  }
+  EXPECT_FALSE(first.empty());
 }
 
 }  // namespace

@@ -63,7 +63,8 @@ TEST_P(EveryStorage, ReadsObjectsAndPartsOfThem) {
 
 TEST_P(EveryStorage, AMissingObjectIsNone) {
   const auto storage = make();
-  for (const char* key : {"none", "0/none", "0/c/0/0/2", "00", "zarr", "none/zarr.json"}) {
+  for (const char* key :
+       {"none", "0/none", "0/c/0/0/2", "00", "zarr", "none/zarr.json", "zarr.json/x", "0", "0/c"}) {
     EXPECT_FALSE(storage->open(key)) << key;
     EXPECT_NE(storage->name_of(key), "");
   }
@@ -90,6 +91,8 @@ TEST_P(EveryStorage, ListsWhatIsDirectlyBelow) {
   EXPECT_EQ(sorted(storage->list("isobrick/0/index")), (Names{"kdtree", "octree"}));
   EXPECT_EQ(storage->list("none"), Names());
   EXPECT_EQ(storage->list("is"), Names());
+  EXPECT_EQ(storage->list("zarr.json"), Names());
+  EXPECT_EQ(storage->list("zarr.json/x"), Names());
 }
 
 TEST_P(EveryStorage, ManyThreadsRead) {
@@ -191,6 +194,17 @@ TEST(Storage, ReadersOpenFoldersAndZips) {
   write_file(folder / "c.txt", "text");
   for (const char* name : {"c.txt", "none"})
     EXPECT_TRUE(contains(message_of<Error>([&] { open_storage(folder / name); }), "is no store"));
+  EXPECT_TRUE(contains(message_of<Error>([&] { open_storage(folder / std::string(300, 'a')); }),
+                       "File name too long"));
+}
+
+TEST(Storage, FunctionsForSizeAndReadAreNeeded) {
+  StorageFunctions functions;
+  EXPECT_THROW(function_storage(functions, "bucket"), UsageError);
+  functions.size = [](const std::string&) { return std::nullopt; };
+  EXPECT_THROW(function_storage(functions, "bucket"), UsageError);
+  functions.read = [](const std::string&, std::uint64_t, std::span<std::byte>) {};
+  EXPECT_TRUE(function_storage(functions, "bucket"));
 }
 
 TEST(Storage, WhatFunctionsThrowReachesTheReader) {
@@ -198,8 +212,50 @@ TEST(Storage, WhatFunctionsThrowReachesTheReader) {
   functions.size = [](const std::string&) -> std::optional<std::uint64_t> {
     throw Error("the network is down");
   };
+  functions.read = [](const std::string&, std::uint64_t, std::span<std::byte>) {};
   const auto storage = function_storage(functions, "bucket");
   EXPECT_EQ(message_of<Error>([&] { StoreReader store(storage); }), "the network is down");
+}
+
+// A reader closes the objects that it used long ago, but keeps the indices of their shards.
+TEST(Storage, AShardThatVanishesIsMissed) {
+  const TemporaryFolder folder;
+  write_store(folder / "a.zarr", {make_level(ScalarType::u8, {192, 192, 192}, 16, 32, 0, false)}, 3,
+              0);
+  const Contents contents = contents_of(folder / "a.zarr");
+  bool is_gone = false;
+  StorageFunctions functions;
+  functions.size = [&](const std::string& key) -> std::optional<std::uint64_t> {
+    const auto found = contents.find(key);
+    if (found == contents.end() || (is_gone && key == "0/c/0/0/0")) return std::nullopt;
+    return found->second.size();
+  };
+  functions.read = [&](const std::string& key, std::uint64_t offset, std::span<std::byte> bytes) {
+    std::memcpy(bytes.data(), contents.at(key).data() + offset, bytes.size());
+  };
+  const StoreReader store(function_storage(functions, "bucket"));
+  std::vector<std::byte> brick(store.info().levels[0].lattice.brick_bytes());
+  ASSERT_TRUE(store.read_brick(0, {0, 0, 0}, brick.data()));
+  is_gone = true;
+  for_each_point({{1, 0, 0}, {6, 6, 6}},
+                 [&](Int3 shard) { store.read_brick(0, shard * 2, brick.data()); });
+  const std::string missing = "'" + store.storage()->name_of("0/c/0/0/0") + "' is missing";
+  const auto read = [&] { store.read_brick(0, {1, 0, 0}, brick.data()); };
+  EXPECT_TRUE(contains(message_of<DamageError>(read), missing));
+  const auto hint = [&] { store.will_need(0, {1, 0, 0}); };
+  EXPECT_TRUE(contains(message_of<DamageError>(hint), missing));
+}
+
+TEST(Storage, LevelsThatDoNotExistAreRefused) {
+  const TemporaryFolder folder;
+  write_store(folder / "a.zarr", {make_level(ScalarType::u8, {20, 20, 20}, 16, 32, 0, false)}, 3,
+              0);
+  const StoreReader store(folder / "a.zarr");
+  for (const int level : {-1, 1}) {
+    EXPECT_THROW(store.has_ranges(level), UsageError);
+    EXPECT_THROW(store.will_need(level, {0, 0, 0}), UsageError);
+    EXPECT_THROW(store.block_ranges(level, {{0, 0, 0}, {1, 1, 1}}), UsageError);
+  }
 }
 
 TEST(Storage, KeysHaveNoEmptyParts) {

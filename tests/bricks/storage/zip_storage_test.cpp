@@ -75,6 +75,18 @@ TEST(ZipStorage, NamesThatLeadOutAreRefused) {
   }
 }
 
+TEST(ZipStorage, NamesThatAreNoKeysAreRefused) {
+  for (const char* name : {"./zarr.json", "0/./zarr.json", "0//zarr.json", "0/."}) {
+    ZipWriter zip;
+    zip.add("zarr.json", "x");
+    zip.add(name, "x");
+    EXPECT_TRUE(contains(refusal(zip.finish()), "has an empty part or '.'")) << name;
+  }
+  ZipWriter folders;
+  for (const char* name : {"./", "0/", "zarr.json"}) folders.add(name, "");
+  EXPECT_TRUE(zip_in_memory(folders.finish())) << "entries of folders hold nothing";
+}
+
 TEST(ZipStorage, TwoEntriesOfOneNameAreRefused) {
   ZipWriter zip;
   for (const char* name : {"zarr.json", "0/zarr.json", "zarr.json"}) zip.add(name, "x");

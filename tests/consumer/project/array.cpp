@@ -16,5 +16,6 @@ int main() {
   for (const double radius : {10, 20, 30}) {
     extractor.extract({.isovalue = radius, .inside = isobrick::Inside::below}, mesh);
     std::printf("radius %g: %zu triangles\n", radius, mesh.triangles.size());
+    if (mesh.triangles.empty()) return 1;
   }
 }

@@ -11,6 +11,7 @@ int main() try {
   std::stop_source stop;
   std::jthread impatient([&] { stop.request_stop(); });
   isobrick::convert(*source, "large.zarr", {.force = true, .cancel = stop.get_token()});
+  return 1;  // nobody ended it
 } catch (const isobrick::Cancelled& error) {
   std::printf("%s\n", error.what());
   return std::filesystem::exists("large.zarr") ? 1 : 0;

@@ -18,4 +18,5 @@ int main() {
       [&](const isobrick::MeshChunk& c) { triangles += c.triangles.size(); });
   isobrick::extract(field, {.isovalue = 0.5, .memory = 64 << 20}, sink);
   std::printf("%zu triangles\n", triangles);
+  return triangles > 0 ? 0 : 1;
 }
