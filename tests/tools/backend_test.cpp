@@ -18,7 +18,11 @@ bool without_cuda(const Outcome& outcome) {
 /// Of a store that waves() has made: an isovalue in the middle of its samples.
 std::string middle_of(const std::filesystem::path& store) {
   const std::string type = store.stem().string();
-  return type == "f32" ? "0.01" : type == "u16" ? "32767.5" : type == "u8" ? "127.5" : "0.5";
+  return type.starts_with("f") ? "0.01"
+         : type == "u16"       ? "32767.5"
+         : type == "u32"       ? "2147483647.5"
+         : type == "u8"        ? "127.5"
+                               : "0.5";
 }
 
 class Backend : public ProgramTest {
@@ -143,7 +147,7 @@ class Cuda : public Backend {
 };
 
 TEST_F(Cuda, FilesAreThoseOfTheCpu) {
-  for (const std::string type : {"u8", "i8", "u16", "i16", "f32"})
+  for (const std::string type : {"u8", "i8", "u16", "i16", "u32", "i32", "f32", "f64"})
     for (const std::string brick : {"20", "32", "48", "64"}) {
       SCOPED_TRACE(type + ", bricks of " + brick);
       const std::string store = waves(type, {"--brick", brick});
@@ -221,11 +225,11 @@ class ResidentCuda : public Cuda {
 };
 
 TEST_F(ResidentCuda, FilesAreThoseOfTheCpu) {
-  const std::map<std::string, Arguments> isovalues_of{{"u8", {"127.5", "160", "90"}},
-                                                      {"i8", {"0.5", "30", "-30"}},
-                                                      {"u16", {"32767.5", "40000", "20000"}},
-                                                      {"i16", {"0.5", "8000", "-8000"}},
-                                                      {"f32", {"0.01", "0.25", "-0.25"}}};
+  const std::map<std::string, Arguments> isovalues_of{
+      {"u8", {"127.5", "160", "90"}},         {"i8", {"0.5", "30", "-30"}},
+      {"u16", {"32767.5", "40000", "20000"}}, {"i16", {"0.5", "8000", "-8000"}},
+      {"i32", {"0.5", "8e8", "-8e8"}},        {"f32", {"0.01", "0.25", "-0.25"}},
+      {"f64", {"0.01", "0.25", "-0.25"}}};
   for (const auto& [type, isovalues] : isovalues_of) {
     const std::string store = waves(type, {"--brick", type == "u8" ? "20" : "32"});
     SCOPED_TRACE(type);
