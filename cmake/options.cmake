@@ -12,10 +12,6 @@ set(CMAKE_CXX_STANDARD 20)
 set(CMAKE_CXX_STANDARD_REQUIRED ON)
 set(CMAKE_CXX_EXTENSIONS OFF)
 set(CMAKE_POSITION_INDEPENDENT_CODE ON)
-# Only what ISOBRICK_API marks leaves a shared library.
-set(CMAKE_CXX_VISIBILITY_PRESET hidden)
-set(CMAKE_CUDA_VISIBILITY_PRESET hidden)
-set(CMAKE_VISIBILITY_INLINES_HIDDEN ON)
 set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
 set(CMAKE_OPTIMIZE_DEPENDENCIES ON)  # files of a library compile before the libraries that it links
 set(CMAKE_RUNTIME_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/bin)
@@ -74,7 +70,9 @@ function(isobrick_library name)
   cmake_parse_arguments(arg "" "" "SOURCES;LINK;PRIVATE" ${ARGN})
   add_library(isobrick_${name} STATIC ${arg_SOURCES})
   add_library(isobrick::${name} ALIAS isobrick_${name})
-  set_target_properties(isobrick_${name} PROPERTIES EXPORT_NAME ${name})
+  # Only what ISOBRICK_API marks leaves the shared library.
+  set_target_properties(isobrick_${name} PROPERTIES EXPORT_NAME ${name}
+    CXX_VISIBILITY_PRESET hidden CUDA_VISIBILITY_PRESET hidden VISIBILITY_INLINES_HIDDEN ON)
   target_include_directories(isobrick_${name} PUBLIC
     $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/include> $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
   target_compile_features(isobrick_${name} PUBLIC cxx_std_20)
