@@ -52,8 +52,10 @@ nlohmann::ordered_json indexes_json(const VerifyReport& report) {
 int run_verify(const VerifyArguments& arguments, Console& console) {
   check_store(arguments.store);
   set_interrupt_note([] { return "nobody knows whether the store is whole"; });
-  const VerifyReport report = verify(arguments.store, arguments.threads, console.progress(),
-                                     arguments.selection, arguments.memory);
+  const VerifyReport report = verify(
+      arguments.store,
+      {.threads = arguments.threads, .selection = arguments.selection, .memory = arguments.memory},
+      console.progress());
   const nlohmann::ordered_json object{{"command", "verify"},
                                       {"input", arguments.store},
                                       {"whole", report.damage_count == 0},

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -26,14 +27,22 @@ struct VerifyReport {
   std::uint64_t damage_count = 0;  ///< all damages, also those that are not kept
 };
 
+/// How a store is checked.
+struct VerifyOptions {
+  int threads = 0;                                ///< 0: all cores
+  Selection selection = {};                       ///< which image of several
+  std::uint64_t memory = std::uint64_t{1} << 30;  ///< hard budget, bytes
+  /// Ends the operation with Cancelled, soon after a stop is requested on any thread.
+  std::stop_token cancel = {};
+};
+
 /// Reads all of a store: metadata, shard indices, every brick's checksum and
 /// size, the ranges against the samples, and every index against both. What cannot be looked at
-/// counts as damage. Within `memory` bytes, with fewer threads where they take too much of it.
+/// counts as damage. Takes fewer threads where they need more memory than the budget has.
 /// Throws when the root cannot be read, and UsageError when the budget is too small, with the
 /// least that is not.
-ISOBRICK_API VerifyReport verify(const std::filesystem::path& store, int threads = 0,
-                                 Progress& progress = no_progress(),
-                                 const Selection& selection = {},
-                                 std::uint64_t memory = std::uint64_t{1} << 30);
+ISOBRICK_API VerifyReport verify(const std::filesystem::path& store,
+                                 const VerifyOptions& options = {},
+                                 Progress& progress = no_progress());
 
 }  // namespace isobrick

@@ -14,6 +14,7 @@
 #include "bricks/stored_index.h"
 #include "bricks/zarr/json_reader.h"
 #include "bricks/zarr/store_names.h"
+#include "core/cancellable_progress.h"
 #include "pipeline/histogram/histogram.h"
 #include "pipeline/index/level_scan.h"
 #include "pipeline/program_memory.h"
@@ -243,12 +244,13 @@ std::vector<std::vector<std::string>> find_indexes(const StoreReader& store, Dam
 
 }  // namespace
 
-VerifyReport verify(const std::filesystem::path& path, int threads, Progress& progress,
-                    const Selection& selection, std::uint64_t memory) {
+VerifyReport verify(const std::filesystem::path& path, const VerifyOptions& options,
+                    Progress& reported) {
+  CancellableProgress progress(reported, options.cancel);
   DamageList damages;
   std::unique_ptr<StoreReader> store;
   try {
-    store = std::make_unique<StoreReader>(path, selection);
+    store = std::make_unique<StoreReader>(path, options.selection);
   } catch (const DamageError& e) {
     damages.add(e.what());
     return damages.report();
@@ -261,10 +263,10 @@ VerifyReport verify(const std::filesystem::path& path, int threads, Progress& pr
         static_cast<std::uint64_t>(volume(level.lattice.extent)) * level.lattice.sample_bytes();
   }
   progress.begin("verify", bytes);
-  threads = Workers(threads).threads();
+  const int threads = Workers(options.threads).threads();
   verify_groups(*store, damages);
   for (std::size_t level = 0; level < levels.size(); ++level)
-    verify_level(*store, static_cast<int>(level), threads, memory, damages, progress);
+    verify_level(*store, static_cast<int>(level), threads, options.memory, damages, progress);
   progress.end();
   std::uint64_t index_bytes = 0;
   const auto indexes = find_indexes(*store, damages);
@@ -272,7 +274,7 @@ VerifyReport verify(const std::filesystem::path& path, int threads, Progress& pr
     for (const std::string& kind : indexes[i]) {
       const int level = static_cast<int>(i);
       const auto add = [&](const std::string& line) { damages.add(line); };
-      index_bytes += verify_index(*store, level, kind, threads, memory, add, progress);
+      index_bytes += verify_index(*store, level, kind, threads, options.memory, add, progress);
       damages.report().indexes.push_back({level, kind});
     }
   damages.report().bytes = store->bytes_read() + index_bytes;

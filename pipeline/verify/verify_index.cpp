@@ -160,6 +160,8 @@ std::uint64_t verify_index(const StoreReader& store, int level, const std::strin
     return check.bytes_read();
   } catch (const UsageError&) {
     throw;
+  } catch (const Cancelled&) {
+    throw;
   } catch (const Error& e) {
     damage(fmt::format("level {}: {}", level, e.what()));
     return 0;

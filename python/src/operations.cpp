@@ -104,8 +104,12 @@ py::dict index_store(const std::string& path, const std::string& kind, Index lea
 py::dict verify_store(const std::string& path, const VolumeRequest& request,
                       const py::object& callback) {
   const VerifyReport report = interruptible(callback, [&](Reporter reporter) {
-    return verify(path, request.threads, reporter.progress, request.selection,
-                  request.memory.value_or(std::uint64_t{1} << 30));
+    return verify(path,
+                  {.threads = request.threads,
+                   .selection = request.selection,
+                   .memory = request.memory.value_or(std::uint64_t{1} << 30),
+                   .cancel = reporter.cancel},
+                  reporter.progress);
   });
   return py::dict(py::arg("whole") = report.damage_count == 0, py::arg("bricks") = report.bricks,
                   py::arg("bytes_read") = report.bytes,

@@ -14,7 +14,7 @@ const ConvertOptions kOptions{.brick = 16, .shard = 64, .ome = OmeVersion::v04, 
 
 std::uint64_t damages(const fs::path& path) {
   NoProgress progress;
-  return verify(path, 2, progress).damage_count;
+  return verify(path, {.threads = 2}, progress).damage_count;
 }
 
 TEST(ConvertOme04, IsTheSameStoreButForItsFiles) {

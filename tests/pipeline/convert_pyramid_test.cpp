@@ -28,7 +28,7 @@ void expect_pyramid(const std::filesystem::path& path, const std::vector<Int3>& 
     samples = coarser;
   }
   NoProgress progress;
-  EXPECT_EQ(verify(path, 2, progress).damage_count, 0u);
+  EXPECT_EQ(verify(path, {.threads = 2}, progress).damage_count, 0u);
 }
 
 TEST(ConvertPyramid, HalvesBySpacing) {

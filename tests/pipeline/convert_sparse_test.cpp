@@ -78,7 +78,7 @@ void expect_dense_store(Int3 extent, Box3 there, double fill, const ConvertOptio
   for (int level = 0; level < b.levels; ++level)
     EXPECT_EQ(samples_of(store, level), samples_of(dense_store, level)) << level;
   NoProgress silent;
-  EXPECT_EQ(verify(folder / "sparse", 2, silent).damage_count, 0u);
+  EXPECT_EQ(verify(folder / "sparse", {.threads = 2}, silent).damage_count, 0u);
 }
 
 TEST(ConvertSparse, TheStoreIsThatOfTheDenseVolume) {

@@ -65,7 +65,7 @@ TYPED_TEST(Convert, KeepsEverySampleAndItsRanges) {
       e = coarser_extent(e, kHalveAll);
     }
     NoProgress progress;
-    const VerifyReport check = verify(folder / "a.zarr", 2, progress);
+    const VerifyReport check = verify(folder / "a.zarr", {.threads = 2}, progress);
     EXPECT_EQ(check.damage_count, 0u) << (check.damages.empty() ? "" : check.damages[0]);
     EXPECT_EQ(check.bricks, report.bricks);
     bool nan = false;
@@ -92,7 +92,7 @@ TEST(ConvertLayout, BytesDependOnNothingButTheInputAndTheOptions) {
     EXPECT_EQ(tree_of(folder / "one"), tree_of(folder / "four"));
     EXPECT_EQ(tree_of(folder / "one"), tree_of(folder / "stream"));
     NoProgress progress;
-    EXPECT_EQ(verify(folder / "one", 1, progress).damage_count, 0u);
+    EXPECT_EQ(verify(folder / "one", {.threads = 1}, progress).damage_count, 0u);
   }
 }
 
@@ -145,7 +145,7 @@ TEST(ConvertBudget, OddBricksKeepSamplesAndRangesInPieces) {
   const StoreReader store(folder / "a");
   EXPECT_EQ(samples_of(store, 0), source.samples());
   NoProgress progress;
-  EXPECT_EQ(verify(folder / "a", 2, progress).damage_count, 0u);
+  EXPECT_EQ(verify(folder / "a", {.threads = 2}, progress).damage_count, 0u);
 }
 
 TEST(ConvertResume, FinishesWhatWasInterruptedByteForByte) {

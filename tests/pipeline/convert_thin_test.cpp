@@ -74,7 +74,7 @@ class ConvertThinStore : public ::testing::TestWithParam<Int3> {
   /// The samples of every level, which must be whole.
   static std::vector<std::vector<std::byte>> levels_of(const std::filesystem::path& path) {
     NoProgress silent;
-    const VerifyReport report = verify(path, 2, silent);
+    const VerifyReport report = verify(path, {.threads = 2}, silent);
     EXPECT_EQ(report.damage_count, 0u) << (report.damages.empty() ? "" : report.damages[0]);
     const StoreReader store(path);
     std::vector<std::vector<std::byte>> levels;

@@ -56,7 +56,7 @@ inline IndexReport add_index_quietly(const std::filesystem::path& store, IndexOp
 
 inline VerifyReport verify_quietly(const std::filesystem::path& store) {
   NoProgress silent;
-  return verify(store, 2, silent);
+  return verify(store, {.threads = 2}, silent);
 }
 
 /// Throws at the n-th step of a stage.

@@ -31,7 +31,7 @@ class StoredCounts : public ::testing::Test {
   /// What verify and readers report of the same damage.
   void expect_damaged(const std::string& part) {
     NoProgress silent;
-    const VerifyReport report = verify(folder_ / "a", 2, silent);
+    const VerifyReport report = verify(folder_ / "a", {.threads = 2}, silent);
     ASSERT_EQ(report.damage_count, 1u) << part;
     EXPECT_NE(report.damages[0].find(part), std::string::npos) << report.damages[0];
     EXPECT_THROW(stored_histogram(store()), DamageError) << part;
@@ -64,7 +64,7 @@ TEST_F(StoredCounts, AreNoPartThatAStoreNeeds) {
   drop_histogram(folder_ / "a");
   EXPECT_EQ(stored_histogram(store()), std::nullopt);
   NoProgress silent;
-  EXPECT_EQ(verify(folder_ / "a", 2, silent).damage_count, 0u);
+  EXPECT_EQ(verify(folder_ / "a", {.threads = 2}, silent).damage_count, 0u);
   EXPECT_EQ(histogram(store(), silent).level, 0);
 }
 
@@ -93,7 +93,7 @@ TEST_F(StoredCounts, AreRefusedWhenTheyAreThoseOfAnotherStore) {
   const StoredHistogram other = *read_stored_ranges(*folder_storage(folder_ / "b"), "")->histogram;
   change_ranges([&](StoredHistogram& h) { h = other; });
   NoProgress silent;
-  const VerifyReport report = verify(folder_ / "a", 2, silent);
+  const VerifyReport report = verify(folder_ / "a", {.threads = 2}, silent);
   ASSERT_EQ(report.damage_count, 1u);
   EXPECT_EQ(report.damages[0], "level 0: its histogram is not that of its samples");
 }
@@ -122,7 +122,7 @@ TEST_F(StoredCounts, OfNoFiniteSample) {
   MemorySource source({10, 5, 2}, ScalarType::f32, as_bytes(nan));
   convert_quietly(source, folder_ / "nan", {});
   NoProgress silent;
-  EXPECT_EQ(verify(folder_ / "nan", 1, silent).damage_count, 0u);
+  EXPECT_EQ(verify(folder_ / "nan", {.threads = 1}, silent).damage_count, 0u);
   const Histogram h = *stored_histogram(store("nan"));
   EXPECT_TRUE(h.counts.empty());
   EXPECT_LT(h.hi, h.lo);

@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <isobrick/error.h>
+#include <isobrick/index_build.h>
 #include <isobrick/verify.h>
 #include "bricks/ranges/stored_ranges.h"
 #include "tests/pipeline/convert_store.h"
@@ -22,7 +23,7 @@ class Verify : public ::testing::Test {
 
   VerifyReport check(int threads = 2) {
     NoProgress progress;
-    return verify(folder_ / "a", threads, progress);
+    return verify(folder_ / "a", {.threads = threads}, progress);
   }
 
   void flip(const std::filesystem::path& file, std::uint64_t offset) {
@@ -55,6 +56,28 @@ TEST_F(Verify, FindsEveryDamagedBrick) {
   }
   EXPECT_EQ(check(1).damage_count, 3u);
   EXPECT_EQ(check(4).damage_count, 3u);
+}
+
+/// A stop ends it, and is no damage.
+TEST_F(Verify, CanBeCancelled) {
+  NoProgress silent;
+  add_index(folder_ / "a", {.kind = IndexKind::octree}, silent);
+  struct StopAt final : Progress {
+    std::string stage;
+    std::stop_source stop;
+    explicit StopAt(std::string s) : stage(std::move(s)) {}
+    void begin(std::string_view name, std::uint64_t) override {
+      if (name.find(stage) != std::string_view::npos) stop.request_stop();
+    }
+    void advance(std::uint64_t) override {}
+    void end() override {}
+  };
+  for (const std::string stage : {"verify", "index"}) {
+    StopAt progress(stage);
+    EXPECT_THROW(verify(folder_ / "a", {.cancel = progress.stop.get_token()}, progress), Cancelled)
+        << stage;
+  }
+  EXPECT_EQ(check().damage_count, 0u);
 }
 
 TEST_F(Verify, CountsABrokenShardIndexOnce) {
@@ -115,7 +138,7 @@ TEST_F(Verify, ReportsBrokenMetadataAndThrowsWithoutAStore) {
   std::ofstream(folder_ / "a" / "1" / "zarr.json") << "{";
   EXPECT_EQ(check().damage_count, 1u);
   NoProgress progress;
-  EXPECT_THROW(verify(folder_ / "nothing", 1, progress), Error);
+  EXPECT_THROW(verify(folder_ / "nothing", {.threads = 1}, progress), Error);
 }
 
 }  // namespace
