@@ -311,7 +311,10 @@ RangeTable StoreReader::Impl::ranges(int level, Box3 box, bool blocks) {
 }
 
 std::string index_command(const StoreInfo& info) {
-  std::string command = "isobrick index " + shell_word(info.name);
+  const bool is_zip = info.name.ends_with(".zip");  // which cannot be changed
+  std::string command =
+      is_zip ? fmt::format("unpack {} to FOLDER, then isobrick index FOLDER", shell_word(info.name))
+             : "isobrick index " + shell_word(info.name);
   if (info.selection.channel) command += fmt::format(" --channel {}", *info.selection.channel);
   if (info.selection.time) command += fmt::format(" --time {}", *info.selection.time);
   return command;

@@ -61,6 +61,9 @@ TEST_P(ZippedStore, IsReadByEveryCommandThatReadsAStore) {
 TEST_P(ZippedStore, IsNamedInMessagesAndNotChanged) {
   const std::string zip = zip_of(make_store("a")), before = read_file(zip);
   expect_refused(run({"index", zip}), 2, {"a.zarr.zip' is a zip, which cannot be changed"});
+  expect_refused(
+      run({"extract", zip, "--isovalue", "128", "--search", "octree", "-o", path("m.ply")}), 2,
+      {"unpack ", "a.zarr.zip", "isobrick index FOLDER --kind octree"});
   expect_refused(run({"export", zip, zip, "--format", "raw", "--force"}), 2, {"a.zarr.zip"});
   EXPECT_TRUE(read_file(zip) == before);
   write_file(zip, before.substr(0, before.size() / 2));
