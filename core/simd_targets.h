@@ -3,6 +3,10 @@
 #include <hwy/base.h>
 #include <hwy/targets.h>
 
+#if HWY_ARCH_X86
+#include <cpuid.h>
+#endif
+
 #include <algorithm>
 #include <atomic>
 
@@ -15,6 +19,20 @@ namespace isobrick::inline v0 {
 /// What this processor has of what functions are compiled for, from the least to the most.
 enum class SimdLevel { baseline, sse4, avx2, avx3, avx3_dl };
 
+#if HWY_ARCH_X86
+/// Features that Clang's __builtin_cpu_supports() does not know.
+struct MoreFeatures {
+  bool f16c = false, vaes = false;
+};
+inline MoreFeatures more_features() {
+  unsigned a = 0, b = 0, c = 0, d = 0;
+  MoreFeatures more;
+  if (__get_cpuid(1, &a, &b, &c, &d)) more.f16c = (c >> 29 & 1) != 0;
+  if (__get_cpuid_count(7, 0, &a, &b, &c, &d)) more.vaes = (c >> 9 & 1) != 0;
+  return more;
+}
+#endif
+
 inline SimdLevel find_simd_level() {
 #if HWY_ARCH_X86
   __builtin_cpu_init();
@@ -23,7 +41,7 @@ inline SimdLevel find_simd_level() {
   if (!sse4) return SimdLevel::baseline;
   const bool avx2 = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") &&
                     __builtin_cpu_supports("bmi") && __builtin_cpu_supports("bmi2") &&
-                    __builtin_cpu_supports("f16c");
+                    more_features().f16c;
   if (!avx2) return SimdLevel::sse4;
   const bool avx3 = __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") &&
                     __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512bw") &&
@@ -31,7 +49,7 @@ inline SimdLevel find_simd_level() {
   if (!avx3) return SimdLevel::avx2;
   const bool avx3_dl =
       __builtin_cpu_supports("avx512vnni") && __builtin_cpu_supports("vpclmulqdq") &&
-      __builtin_cpu_supports("vaes") && __builtin_cpu_supports("avx512vbmi") &&
+      more_features().vaes && __builtin_cpu_supports("avx512vbmi") &&
       __builtin_cpu_supports("avx512vbmi2") && __builtin_cpu_supports("avx512bitalg") &&
       __builtin_cpu_supports("avx512vpopcntdq");
   return avx3_dl ? SimdLevel::avx3_dl : SimdLevel::avx3;

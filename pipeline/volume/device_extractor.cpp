@@ -59,6 +59,9 @@ struct DeviceExtractor::Impl {
 struct PendingDeviceMesh::Impl {
   std::shared_ptr<DeviceExtractor::Impl> of;
   std::uint64_t number;
+
+  Impl(std::shared_ptr<DeviceExtractor::Impl> extractor, std::uint64_t n)
+      : of(std::move(extractor)), number(n) {}
 };
 
 PendingDeviceMesh::PendingDeviceMesh(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
