@@ -5,6 +5,7 @@
 //   bench_device_arrays --synth sphere --type f64 --layout fortran
 //
 // Correctness first: the mesh is compared with the CPU's, byte for byte.
+// Built as in bench/README.md.
 
 #include <cuda_runtime_api.h>
 #include <fmt/format.h>

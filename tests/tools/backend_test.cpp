@@ -225,11 +225,13 @@ class ResidentCuda : public Cuda {
 };
 
 TEST_F(ResidentCuda, FilesAreThoseOfTheCpu) {
-  const std::map<std::string, Arguments> isovalues_of{
-      {"u8", {"127.5", "160", "90"}},         {"i8", {"0.5", "30", "-30"}},
-      {"u16", {"32767.5", "40000", "20000"}}, {"i16", {"0.5", "8000", "-8000"}},
-      {"i32", {"0.5", "800000000", "-800000000"}},        {"f32", {"0.01", "0.25", "-0.25"}},
-      {"f64", {"0.01", "0.25", "-0.25"}}};
+  const std::map<std::string, Arguments> isovalues_of{{"u8", {"127.5", "160", "90"}},
+                                                      {"i8", {"0.5", "30", "-30"}},
+                                                      {"u16", {"32767.5", "40000", "20000"}},
+                                                      {"i16", {"0.5", "8000", "-8000"}},
+                                                      {"i32", {"0.5", "800000000", "-800000000"}},
+                                                      {"f32", {"0.01", "0.25", "-0.25"}},
+                                                      {"f64", {"0.01", "0.25", "-0.25"}}};
   for (const auto& [type, isovalues] : isovalues_of) {
     const std::string store = waves(type, {"--brick", type == "u8" ? "20" : "32"});
     SCOPED_TRACE(type);
