@@ -144,7 +144,9 @@ void clip(uint bits) {
 }  // namespace
 
 std::string fragment_glsl(bool clips) {
-  return kHereGlsl + std::string(clips ? kClipGlsl : "void clip(uint bits) {}\n");
+  std::string text = kHereGlsl;
+  text += clips ? kClipGlsl : "void clip(uint bits) {}\n";
+  return text;
 }
 
 const char* const kLightGlsl = R"(
