@@ -27,7 +27,9 @@ constexpr Int3 kOne{1, 1, 1};
 constexpr Index kMaxRegion = 4;
 /// Regions between two reports of progress, and tiles.
 constexpr std::size_t kRegionsAtOnce = 64;
-constexpr std::size_t kTilesAtOnce = 2048;
+constexpr std::size_t kMaxTilesAtOnce = 2048;
+/// A thread makes so many tiles of noise in some tenths of a second: a stop waits no longer.
+constexpr std::size_t kTilesOfThread = 128;
 /// Bytes of lists for each tile: first one of regions to scan, then one of active tiles.
 constexpr std::uint64_t kListedTile = std::max(sizeof(Box3), sizeof(TileWork));
 /// Triangles number no more vertices.
@@ -244,8 +246,10 @@ Box3 VolumePass::active_cells(const std::vector<TileWork>& tiles) const {
 void VolumePass::extract_array(CpuExtractor& extractor, Progress& progress) {
   const std::uint64_t tile_bytes = kTileVolume * samples_.lattice.sample_bytes();
   progress.begin("extracting", tiles_.size() * tile_bytes);
-  for (std::size_t i = 0; i < tiles_.size(); i += kTilesAtOnce) {
-    const auto some = std::span(tiles_).subspan(i, std::min(kTilesAtOnce, tiles_.size() - i));
+  const std::size_t at_once =
+      std::min(kMaxTilesAtOnce, kTilesOfThread * static_cast<std::size_t>(workers_.threads()));
+  for (std::size_t i = 0; i < tiles_.size(); i += at_once) {
+    const auto some = std::span(tiles_).subspan(i, std::min(at_once, tiles_.size() - i));
     workers_.execute([&] { extractor.extract(some, *samples_.array); });
     progress.advance(some.size() * tile_bytes);
   }

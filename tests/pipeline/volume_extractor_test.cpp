@@ -733,5 +733,22 @@ TEST(VolumeExtractor, ErrorsOfTheFunctionAndCancellingEndIt) {
   EXPECT_LE(reads, 8);
 }
 
+/// So that a stop waits for no more than a part of the work.
+TEST(VolumeExtractorOf, OneThreadReportsAfterEveryFewTiles) {
+  const std::vector<std::uint8_t> samples = [] {
+    std::vector<std::uint8_t> s(200 * 200 * 200);
+    for (std::size_t i = 0; i < s.size(); ++i) s[i] = static_cast<std::uint8_t>(i * 37 % 251);
+    return s;
+  }();
+  struct Counter final : Progress {
+    int reports = 0;
+    void begin(std::string_view, std::uint64_t) override { reports = 0; }
+    void advance(std::uint64_t) override { ++reports; }
+    void end() override {}
+  } progress;
+  extract(Volume::of(samples.data(), {200, 200, 200}), {.isovalue = 100, .threads = 1}, progress);
+  EXPECT_GE(progress.reports, 3);
+}
+
 }  // namespace
 }  // namespace isobrick
