@@ -25,6 +25,8 @@ void add_backend(ordered_json& object, const ExtractReport& r) {
   object["backend"] = r.backend;
   object["device"] = r.device.empty() ? ordered_json() : ordered_json(r.device);
   object["gpu_refusal"] = r.gpu_refusal.empty() ? ordered_json() : ordered_json(r.gpu_refusal);
+  // Made first: an object that operator[] makes of null is not whole where memory ends.
+  object["stages"] = ordered_json::object();
   for (const auto& [name, stage] : stages_of(r))
     object["stages"][std::string(name)] = {{"seconds", stage.seconds}, {"bytes", stage.bytes}};
   object["bound"] = bound_of(r);
