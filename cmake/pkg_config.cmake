@@ -4,7 +4,7 @@ file(RELATIVE_PATH isobrick_pc_up ${CMAKE_INSTALL_FULL_LIBDIR}/pkgconfig ${CMAKE
 set(isobrick_pc_requires "")
 set(isobrick_pc_libs -lisobrick)
 if(NOT BUILD_SHARED_LIBS)
-  string(APPEND isobrick_pc_requires "tbb fmt libzstd libisal libhwy libpng")
+  string(APPEND isobrick_pc_requires "tbb fmt libzstd libisal libhwy libarchive libpng")
   foreach(module BLOSC=blosc LZ4=liblz4 EXPAT=expat TIFF=libtiff-4)
     string(REPLACE "=" ";" module ${module})
     list(GET module 0 option)

@@ -40,7 +40,8 @@ struct NamedFormat {
 const std::vector<NamedFormat>& formats() {
   static const std::vector<NamedFormat> all{{"raw", ExportFormat::raw, {".raw", ".bin", ""}},
                                             {"nrrd", ExportFormat::nrrd, {".nrrd"}},
-                                            {"vdb", ExportFormat::vdb, {".vdb"}}};
+                                            {"vdb", ExportFormat::vdb, {".vdb"}},
+                                            {"zip", ExportFormat::zip, {".zip", ".ozx"}}};
   return all;
 }
 
@@ -62,7 +63,7 @@ ExportFormat format_of(const std::string& path, std::optional<ExportFormat> opti
       if (extension == known) return format.format;
   throw UsageError(
       fmt::format("'{}' is no volume that can be written; name it .nrrd, .vdb, .raw or .bin (raw "
-                  "samples with a .nhdr beside them), or add --format",
+                  "samples with a .nhdr beside them), .zip for the whole store, or add --format",
                   path));
 }
 
@@ -83,11 +84,21 @@ void check(const ExportArguments& arguments) {
     throw UsageError("a level set has one isosurface; give one --isovalue");
 }
 
+/// A zip holds the store as it is.
+void check_zip(const ExportArguments& arguments) {
+  const RegionArguments& part = arguments.region;
+  if (arguments.options.level != 0 || part.roi || part.region || !arguments.isovalues.empty())
+    throw UsageError(
+        "a zip holds the whole store; --level, --roi, --region and --isovalue go with .nrrd, .vdb "
+        "and .raw");
+}
+
 int run_export(const ExportArguments& arguments, Console& console) {
   check(arguments);
   const std::string out = arguments.out.empty() ? default_output(arguments) : arguments.out;
   ExportOptions options = arguments.options;
   options.format = format_of(out, arguments.format);
+  if (options.format == ExportFormat::zip) check_zip(arguments);
   if (is_standard_output(out)) console.reserve_output();
   const std::array<std::filesystem::path, 1> inputs{arguments.input.path};
   check_replaces_no_input(out, inputs);
@@ -100,15 +111,12 @@ int run_export(const ExportArguments& arguments, Console& console) {
   if (!arguments.isovalues.empty())
     options.isovalue = resolve_isovalues(arguments.isovalues, store, console).front();
   options.half_band = arguments.half_band.value_or(options.half_band);
-  export_volume(store, out, options, console.progress());
+  const std::uint64_t bytes = export_volume(store, out, options, console.progress());
   if (options.isovalue)
     if (const std::string why = why_out_of_range(store, options.level, *options.isovalue);
         !why.empty())
       console.note(why);
   const ScalarType type = store.info().type;
-  const std::uint64_t bytes = is_standard_output(out)
-                                  ? static_cast<std::uint64_t>(volume(box.extent())) * size_of(type)
-                                  : std::filesystem::file_size(out);
   nlohmann::ordered_json object{{"command", "export"},
                                 {"input", arguments.input.path},
                                 {"output", out},
@@ -123,7 +131,8 @@ int run_export(const ExportArguments& arguments, Console& console) {
     object["half_band"] = options.half_band;
   }
   const std::string what =
-      options.isovalue
+      options.format == ExportFormat::zip ? std::string("the store")
+      : options.isovalue
           ? fmt::format("level set of isovalue {} over {} samples", *options.isovalue,
                         human_extent(box.extent()))
           : fmt::format("{} samples of {}{}", human_extent(box.extent()), zarr_name(type),
@@ -135,7 +144,7 @@ int run_export(const ExportArguments& arguments, Console& console) {
 ExportFormat parse_format(const std::string& text) {
   for (const NamedFormat& format : formats())
     if (text == format.word) return format.format;
-  throw UsageError(fmt::format("'{}' is no format of a volume; it is raw, nrrd or vdb", text));
+  throw UsageError(fmt::format("'{}' is no format of a volume; it is raw, nrrd, vdb or zip", text));
 }
 
 }  // namespace
@@ -151,11 +160,11 @@ void add_export(Program& program) {
   add_output_or_positional(
       app, arguments->out, "VOLUME",
       "File to write: NRRD if it ends in .nrrd, OpenVDB if in .vdb; raw if in .raw, .bin or "
-      "nothing (C order [z, y, x], little endian), with a header .nhdr beside it; - for raw "
-      "samples, or NRRD, on standard output",
+      "nothing (C order [z, y, x], little endian), with a header .nhdr beside it; the whole store "
+      "if in .zip; - for raw samples, NRRD or a zip on standard output",
       "head.nrrd of head.zarr, or head.vdb with --isovalue");
   add_parsed(app, arguments->format, parse_format,
-             {"--format", "raw|nrrd|vdb",
+             {"--format", "raw|nrrd|vdb|zip",
               "Format of the file; NRRD and OpenVDB keep spacing, origin and direction",
               "by its extension"});
   add_isovalues(app, arguments->isovalues,

@@ -57,10 +57,11 @@ void check_store_name(const std::string& path) {
   if (is_standard_output(path))
     throw UsageError(
         "a store is a folder and cannot go to standard output; name it, such as OUT.zarr");
-  constexpr std::string_view own[] = {".zarr"};
-  refuse_misleading_name(path, own,
-                         "a store is a folder of OME-Zarr: name it .zarr ('isobrick export' "
-                         "writes .nrrd, .vdb and .raw)");
+  constexpr std::string_view own[] = {".zarr", ".zip", ".ozx"};
+  refuse_misleading_name(
+      path, own,
+      "a store is a folder of OME-Zarr: name it .zarr, or .zarr.zip ('isobrick export' "
+      "writes .nrrd, .vdb and .raw)");
 }
 
 void check_can_write(const std::filesystem::path& path, bool force) {

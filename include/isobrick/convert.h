@@ -55,7 +55,8 @@ struct ConvertReport {
 };
 
 /// Writes `source` as a store at `out`: works in `out` + ".partial" and renames
-/// at the end. Reads each input sample once. Throws UsageError when the budget
+/// at the end. Where `out` is named .zip or .ozx it becomes a zip of the store, which needs room
+/// for both while it is written. Reads each input sample once. Throws UsageError when the budget
 /// is too small for one row of bricks (naming the least that does), and where
 /// ConvertStaging does.
 ISOBRICK_API ConvertReport convert(VolumeSource& source, const std::filesystem::path& out,

@@ -12,8 +12,9 @@
 
 namespace isobrick::inline v0 {
 
-/// The files that samples can become. A raw file has a NRRD header beside it, OUT.nhdr.
-enum class ExportFormat : std::uint8_t { raw, nrrd, vdb };
+/// The files that samples can become. A raw file has a NRRD header beside it, OUT.nhdr. A zip holds
+/// the store itself: all levels, with ranges and indices.
+enum class ExportFormat : std::uint8_t { raw, nrrd, vdb, zip };
 
 /// Wider bands of a level set are of no use.
 inline constexpr int kWidestHalfBand = 100;
@@ -36,14 +37,16 @@ struct ExportOptions {
 
 /// Writes the samples of one level (or of a region) bit for bit, C order [z, y, x],
 /// little endian; as NRRD behind a header that keeps their place in world space, as raw with such
-/// a header beside it. `-` is standard output, for raw (without a header then) and NRRD.
+/// a header beside it. `-` is standard output, for raw (without a header then), NRRD and zip.
+/// As zip: as write_zip(), whatever level and region are.
 /// As OpenVDB: a sparse grid with the same samples and place; smaller integers
 /// become int32, u32 becomes int64. With an isovalue a level set (export_level_set.h).
 /// Memory: one row of bricks at a time, within the budget; for OpenVDB also the
 /// grid, which must be whole before it can be written: its samples that are not
 /// the fill value, or a UsageError once they exceed the budget. Nothing appears under
-/// the final name until it is whole.
-ISOBRICK_API void export_volume(const StoreReader& store, const std::filesystem::path& out,
-                                const ExportOptions& options, Progress& progress = no_progress());
+/// the final name until it is whole. Returns the bytes of the file.
+ISOBRICK_API std::uint64_t export_volume(const StoreReader& store, const std::filesystem::path& out,
+                                         const ExportOptions& options,
+                                         Progress& progress = no_progress());
 
 }  // namespace isobrick

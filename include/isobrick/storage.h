@@ -8,10 +8,12 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <stop_token>
 #include <string>
 #include <vector>
 
 #include <isobrick/api.h>
+#include <isobrick/progress.h>
 
 namespace isobrick::inline v0 {
 
@@ -87,5 +89,21 @@ ISOBRICK_API std::shared_ptr<const Storage> function_storage(StorageFunctions fu
 /// A folder or a zip, whichever `path` is. Throws Error where it is neither or cannot be looked at,
 /// and what zip_storage() does.
 ISOBRICK_API std::shared_ptr<const Storage> open_storage(const std::filesystem::path& path);
+
+/// How write_zip() writes.
+struct ZipOptions {
+  bool force = false;  ///< replace a file that exists, once the new one is whole
+  /// Ends the operation with Cancelled, soon after a stop is requested on any thread.
+  std::stop_token cancel = {};
+};
+
+/// Writes all objects of `storage` into one zip at `out`, `-` for standard output, stored without
+/// compression: what zip_storage() reads. Metadata come first, and equal objects make equal bytes.
+/// Keeps their keys in memory, and a few MB. Nothing appears under the final name until it is
+/// whole. Throws UsageError where `out` exists and `force` is not set. Returns the bytes of the
+/// zip.
+ISOBRICK_API std::uint64_t write_zip(const Storage& storage, const std::filesystem::path& out,
+                                     const ZipOptions& options = {},
+                                     Progress& progress = no_progress());
 
 }  // namespace isobrick

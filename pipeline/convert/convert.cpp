@@ -110,9 +110,10 @@ ConvertReport Conversion::run() {
       has_nan, [&] { return display_window(StoreReader(staging_.path())); },
       [&] {
         add_chosen_index(report);
-        staging_.publish();
+        staging_.publish(progress_);
       });
   journal_.remove();
+  staging_.finish();
   report.bytes_in = bytes_of(source_.info().extent, source_.info().type);
   report.bytes_out = store_.bytes() + report.index_bytes;
   report.levels = level_count();

@@ -9,10 +9,12 @@
 #include <cerrno>
 
 #include <isobrick/error.h>
+#include "bricks/storage/write_zip.h"
 #include "bricks/store_entries.h"
 #include "bricks/zarr/store_names.h"
 #include "io/bytes/exchange.h"
 #include "io/bytes/folder_walk.h"
+#include "io/bytes/output_file.h"
 #include "io/bytes/output_guard.h"
 
 namespace isobrick::inline v0 {
@@ -70,18 +72,29 @@ UniqueFd lock_folder(const OutputFolder& parent, const fs::path& folder) {
 
 }  // namespace
 
+bool is_zip_name(const fs::path& out) {
+  const std::string extension = without_last_slash(out).extension().string();
+  return extension == ".zip" || extension == ".ozx";
+}
+
 fs::path staging_path(const fs::path& out) { return without_last_slash(out).string() + ".partial"; }
 
 ConvertStaging::ConvertStaging(fs::path out, bool resume, bool force, std::vector<fs::path> inputs)
     : out_(checked_name(std::move(out))),
       staging_(staging_path(out_)),
       aside_(set_aside_name(out_)),
+      zip_(is_zip_name(out_)),
       force_(force),
       inputs_(std::move(inputs)),
       parent_(parent_of(out_)) {
   end_publication(resume);
   check_out(resume);
   prepare(resume);
+}
+
+void ConvertStaging::check_zip() const {
+  check_output(out_.string(), force_);
+  check_replaces_no_input(out_, inputs_);
 }
 
 void ConvertStaging::end_publication(bool resume) {
@@ -120,6 +133,7 @@ void ConvertStaging::check_out(bool resume) const {
   if (!force_)
     throw UsageError(fmt::format("'{}' exists{}; --force replaces it", out_.string(),
                                  resume ? ", so that there is nothing to resume" : ""));
+  if (zip_) return check_zip();
   if (const std::string why = why_not_our_store(out_); !why.empty())
     throw UsageError(
         fmt::format("'{}' is no store that --force replaces: {}; choose another name or move it "
@@ -152,19 +166,36 @@ void ConvertStaging::prepare(bool resume) {
       throw UsageError(
           fmt::format("'{}' is not replaced: {}; move it away", staging_.string(), store.why()));
   }
-  clear();
+  clear(true);
 }
 
-/// Empties the staging folder; its marker goes last, so that the next run knows what is left.
-void ConvertStaging::clear() const {
+/// Empties the staging folder; its marker goes last, if at all, so that the next run knows what is
+/// left.
+void ConvertStaging::clear(bool marker) const {
   for (const FolderEntry& entry : folder_entries(staging_))
     if (entry.name != kLayoutMarker) parent_.remove_folder(staging_ / entry.name);
-  parent_.remove_file(staging_ / kLayoutMarker);
+  if (marker) parent_.remove_file(staging_ / kLayoutMarker);
 }
 
-void ConvertStaging::publish() {
+void ConvertStaging::publish(Progress& progress) {
   check_out(false);  // it may have appeared since
-  parent_.replace_folder(staging_, out_);
+  if (!zip_) return parent_.replace_folder(staging_, out_);
+  write_zip(progress);
+  clear(false);
+}
+
+void ConvertStaging::write_zip(Progress& progress) const {
+  OutputFile file(out_.string(), force_);
+  const auto wanted = [](const std::string& key) {
+    return key != kLayoutMarker && key != kConvertJournal && !is_temporary_name(key);
+  };
+  v0::write_zip(*folder_storage(staging_), wanted, file.writer(), progress);
+  file.publish();
+  parent_.sync_folder(parent_.root());
+}
+
+void ConvertStaging::finish() const {
+  if (zip_) parent_.remove_folder(staging_);
 }
 
 }  // namespace isobrick

@@ -9,6 +9,7 @@
 #include <span>
 
 #include <isobrick/error.h>
+#include <isobrick/storage.h>
 #include "core/budget_error.h"
 #include "core/cancellable_progress.h"
 #include "io/bytes/file.h"
@@ -260,13 +261,26 @@ void export_dense(const Piece& in, Int3 piece, Workers& workers, OutputFile& out
   progress.end();
 }
 
+void check_is_not_input(const StoreReader& store, const std::filesystem::path& out) {
+  const std::filesystem::path input = store.storage()->local_path();
+  if (!input.empty()) check_replaces_no_input(out, {&input, 1});
+}
+
+std::uint64_t export_zip(const StoreReader& store, const std::filesystem::path& out,
+                         const ExportOptions& options, Progress& progress) {
+  check_is_not_input(store, out);
+  return write_zip(*store.storage(), out, {.force = options.force, .cancel = options.cancel},
+                   progress);
+}
+
 }  // namespace
 
-void export_volume(const StoreReader& store, const std::filesystem::path& out,
-                   const ExportOptions& options, Progress& listener) {
+std::uint64_t export_volume(const StoreReader& store, const std::filesystem::path& out,
+                            const ExportOptions& options, Progress& listener) {
   CancellableProgress progress(listener, options.cancel);
   if (options.isovalue && options.format != ExportFormat::vdb)
     throw UsageError("a level set can only be written as an OpenVDB file");
+  if (options.format == ExportFormat::zip) return export_zip(store, out, options, progress);
   const bool streamed = out == kStandardOutput;
   if (streamed && options.format == ExportFormat::vdb)
     throw UsageError(
@@ -275,15 +289,15 @@ void export_volume(const StoreReader& store, const std::filesystem::path& out,
   const Box3 box = region(store, options.level, options.roi);
   const LevelInfo& level = store.info().levels[static_cast<std::size_t>(options.level)];
   VolumeInfo info = describe(level, box, out.string());
-  const std::filesystem::path input = store.storage()->local_path();
-  if (!input.empty()) check_replaces_no_input(out, {&input, 1});
+  check_is_not_input(store, out);
   bool left = !streamed && remove_leftovers(out.string());
   if (!streamed && options.format == ExportFormat::raw)
     left |= remove_leftovers(DetachedHeader::name_of(out));
   OutputFile output(out.string(), options.force);
   if (options.isovalue) {
     export_level_set(store, box, info, options, output, progress);
-    return output.publish();
+    output.publish();
+    return output.writer().size();
   }
   info.fill_value = store.info().fill_value;
   info.grid_class = store.info().grid_class;
@@ -292,7 +306,8 @@ void export_volume(const StoreReader& store, const std::filesystem::path& out,
   const Piece samples{store, options.level, box};
   if (options.format == ExportFormat::vdb) {
     export_vdb(samples, info, options.memory, workers, output, progress);
-    return output.publish();
+    output.publish();
+    return output.writer().size();
   }
   const Int3 piece = piece_within(level.lattice, box.extent(), options.memory,
                                   fixed_bytes(store.info(), options.level, workers.threads()));
@@ -308,6 +323,7 @@ void export_volume(const StoreReader& store, const std::filesystem::path& out,
     header->publish_with(output);
   else
     output.publish();
+  return output.writer().size();
 }
 
 }  // namespace isobrick

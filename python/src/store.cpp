@@ -158,6 +158,7 @@ void export_samples(const OpenedVolume& volume, const std::string& path, const s
                     bool force, const py::object& callback) {
   const ExportOptions options{.format = format == "nrrd"  ? ExportFormat::nrrd
                                         : format == "vdb" ? ExportFormat::vdb
+                                        : format == "zip" ? ExportFormat::zip
                                                           : ExportFormat::raw,
                               .isovalue = isovalue,
                               .inside = part.inside,
