@@ -274,7 +274,7 @@ TEST_F(ExtractTogether, ABudgetWithoutRoomForAllTakesMorePasses) {
   expect_same(one_by_one, alone);
   for (std::size_t i = 0; i < kRequests.size(); ++i) EXPECT_EQ(one_by_one.reports[i].pass, i);
   const std::uint64_t of_surface =
-      2 * CpuExtractor::max_tile_output(true) + (std::uint64_t{4} << 20);
+      2 * CpuExtractor::max_tile_output(true, Topology::consistent) + (std::uint64_t{4} << 20);
   const Made in_pairs =
       make_together(reader, {.memory = least + of_surface, .threads = 2}, kRequests);
   expect_same(in_pairs, alone);
