@@ -43,7 +43,8 @@ struct FaceConfiguration {
 struct CaseConfigurations {
   std::uint16_t first = 0;             ///< of the configurations
   std::uint16_t consistent_patch = 0;  ///< which the case tables have
-  std::uint8_t ambiguous = 0;          ///< faces, as bits
+  std::uint8_t faces = 0;              ///< how many are ambiguous
+  std::uint8_t corners[6][4] = {};     ///< of these faces, in order around them
   bool needs_values = false;           ///< the corners' sides do not decide the patch alone
 };
 
@@ -54,7 +55,6 @@ struct TopologyTables {
   FaceConfiguration configurations[kMaxConfigurations];
   CellPatch patches[kMaxPatches];
   std::uint8_t corners[kMaxCorners];
-  std::uint8_t faces[6][4];  ///< case_rule::kFaces
 };
 
 namespace cell_topology {
@@ -71,7 +71,7 @@ ISOBRICK_HD inline double above_isovalue(double sample, double isovalue) {
 template <int n>
 ISOBRICK_HD inline double scale_of(const double (&d)[n]) {
   double size = 0;
-  for (const double v : d) size = std::fmax(size, std::fabs(v));
+  for (const double v : d) size = std::fabs(v) > size ? std::fabs(v) : size;
   if (size == 0 || (size > 1e-60 && size < 1e60)) return 1;
   // In two steps, because the smallest numbers have no reciprocal.
   const int exponent = std::ilogb(size);
@@ -89,6 +89,9 @@ ISOBRICK_HD inline int compare_products(double a, double b, double c, double d) 
 /// The asymptotic decider: whether the inside of an ambiguous face with these corners, in order
 /// around it, stays in one piece. Both cells at the face get the same answer.
 ISOBRICK_HD inline bool joins_inside(double a, double b, double c, double d) {
+  // Rounding keeps the order of products that differ, and in this range none is lost.
+  const double ac = a * c, bd = b * d, larger = ac > bd ? ac : bd;
+  if (ac != bd && larger > 1e-250 && larger < 1e300) return (ac > bd) == (a >= 0);
   const double corners[4] = {a, b, c, d};
   const double s = scale_of(corners);
   const int sign = compare_products(a * s, c * s, b * s, d * s);
@@ -188,12 +191,9 @@ ISOBRICK_HD inline Necklace necklace(const double (&d)[8]) {
 ISOBRICK_HD inline int patch_of(const TopologyTables& tables, int index, const double (&d)[8]) {
   const CaseConfigurations& of_case = tables.cases[index];
   int configuration = of_case.first;
-  int bit = 1;
-  for (int f = 0; f < 6; ++f) {
-    if (!(of_case.ambiguous >> f & 1)) continue;
-    const std::uint8_t(&c)[4] = tables.faces[f];
-    if (joins_inside(d[c[0]], d[c[1]], d[c[2]], d[c[3]])) configuration += bit;
-    bit *= 2;
+  for (int f = 0; f < of_case.faces; ++f) {
+    const std::uint8_t(&c)[4] = of_case.corners[f];
+    configuration += static_cast<int>(joins_inside(d[c[0]], d[c[1]], d[c[2]], d[c[3]])) << f;
   }
   const FaceConfiguration& decided = tables.configurations[configuration];
   if (!(decided.tunnel[0] | decided.tunnel[1] | decided.tunnel[2] | decided.tunnel[3]))

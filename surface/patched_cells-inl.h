@@ -10,6 +10,7 @@
 #include "surface/coincident_vertices-inl.h"
 #include "surface/inner_vertices.h"
 #include "surface/patched_cells.h"
+#include "surface/tile_triangles-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace isobrick::inline v0 {
@@ -66,24 +67,40 @@ void write_inner_vertices(const KernelContext& context, const TileState& tile, V
   }
 }
 
-/// Writes the triangles of the patched cells, without the degenerate ones where the tile leaves
-/// them out.
+/// Writes the triangles of the patched cells.
 inline void write_patched_triangles(bool mirrored, const TileState& tile, Triangle* out) {
+  const TopologyTables& tables = topology_tables();
+  const std::size_t second = mirrored ? 2 : 1, third = 3 - second;
+  std::uint32_t inner = tile.number_base + tile.edge_vertices;
+  CellNumbers numbers(tile);
+  alignas(64) std::uint32_t ids[16];
+  static_assert(kFirstInner + kMaxPatchInner <= 16);
+  for (const PatchedCell& cell : tile.patched) {
+    const CellPatch& patch = tables.patches[cell.patch];
+    numbers.find(cell.cell, ids);
+    for (std::uint32_t n = 0; n < patch.inner; ++n) ids[kFirstInner + n] = inner++;
+    const std::uint8_t* corners = tables.corners + patch.first;
+    for (int n = patch.triangles; n > 0; --n, corners += 3)
+      *out++ = {ids[corners[0]], ids[corners[second]], ids[corners[third]]};
+  }
+}
+
+/// The same, without degenerate triangles.
+inline void write_kept_patched_triangles(bool mirrored, const TileState& tile, Triangle* out) {
   const TopologyTables& tables = topology_tables();
   std::uint32_t inner = tile.number_base + tile.edge_vertices;
   for (const PatchedCell& cell : tile.patched) {
     const CellPatch& patch = tables.patches[cell.patch];
     const int x = static_cast<int>(cell.cell & 31), y = static_cast<int>(cell.cell >> 5 & 31),
               z = static_cast<int>(cell.cell >> 10 & 31);
-    const std::uint32_t at =
-        tile.coincident ? coincident::corner_bits(tile.coincident->at, x, y, z) : 0;
     const auto number = [&](int vertex) {
       if (vertex < 8) return coincident_number(*tile.coincident, x, y, z, vertex);
       const int corner = vertex - 8;
       return corner < kFirstInner ? edge_number(tile, x, y, z, corner)
                                   : inner + static_cast<std::uint32_t>(corner - kFirstInner);
     };
-    coincident::for_each_kept(tables.corners + patch.first, patch.triangles, at,
+    coincident::for_each_kept(tables.corners + patch.first, patch.triangles,
+                              coincident::corner_bits(tile.coincident->at, x, y, z),
                               [&](int a, int b, int c) {
                                 *out++ = mirrored ? Triangle{number(a), number(c), number(b)}
                                                   : Triangle{number(a), number(b), number(c)};

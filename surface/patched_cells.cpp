@@ -11,6 +11,8 @@ void count(const KernelContext& context, TileState& tile) {
   const T* samples = reinterpret_cast<const T*>(tile.samples.data());
   tile.clear_patched();
   std::uint32_t left_to_tables = tile.triangles;
+  tile.patched.resize(tile.cells.size());
+  PatchedCell* out = tile.patched.begin();
   ActiveCell* kept = tile.cells.begin();
   for (const ActiveCell cell : tile.cells) {
     const std::uint32_t index = cell >> 16;
@@ -21,8 +23,7 @@ void count(const KernelContext& context, TileState& tile) {
                                  static_cast<int>(cell >> 10 & 31));
       const int patch = cell_topology::patch_of(tables, static_cast<int>(index), values.d);
       if (patch != of_case.consistent_patch) {
-        tile.patched.resize(tile.patched.size() + 1);
-        tile.patched[tile.patched.size() - 1] = {cell, static_cast<std::uint32_t>(patch)};
+        *out++ = {cell, static_cast<std::uint32_t>(patch)};
         left_to_tables -= kCaseTables.triangles[index];
         tile.patched_triangles += tables.patches[patch].triangles;
         tile.inner_vertices += tables.patches[patch].inner;
@@ -31,6 +32,7 @@ void count(const KernelContext& context, TileState& tile) {
     }
     *kept++ = cell;
   }
+  tile.patched.resize(static_cast<std::size_t>(out - tile.patched.begin()));
   tile.cells.resize(static_cast<std::size_t>(kept - tile.cells.begin()));
   tile.triangles = left_to_tables + tile.patched_triangles;
   tile.vertices = tile.edge_vertices + tile.inner_vertices;

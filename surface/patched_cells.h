@@ -1,5 +1,7 @@
 #pragma once
 
+#include <type_traits>
+
 #include "surface/tile_kernels.h"
 #include "surface/tile_state.h"
 #include "surface/topology_tables.h"
@@ -15,11 +17,13 @@ struct CellValues {
   double d[8];
 
   CellValues(const T* samples, double isovalue, int x, int y, int z) {
-    for (int c = 0; c < 8; ++c)
-      d[c] = cell_topology::above_isovalue(
-          static_cast<double>(
-              samples[TileLayout::offset(x + (c & 1), y + (c >> 1 & 1), z + (c >> 2))]),
-          isovalue);
+    const T* first = samples + TileLayout::offset(x, y, z);
+    for (int c = 0; c < 8; ++c) {
+      const auto v = static_cast<double>(
+          first[(c & 1) + (c >> 1 & 1) * TileLayout::kRow + (c >> 2) * TileLayout::kPlane]);
+      // The isovalue of an active cell of integers is finite.
+      d[c] = std::is_integral_v<T> ? v - isovalue : cell_topology::above_isovalue(v, isovalue);
+    }
   }
 };
 

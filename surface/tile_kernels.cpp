@@ -44,13 +44,14 @@ void Write(ScalarType type, const KernelContext& context, TileState& tile, Vec3f
       });
   });
   const CaseTables& tables = context.world.mirrored ? kMirroredCaseTables : kCaseTables;
-  if (tile.coincident && tile.coincident->matter())
+  Triangle* const patched = triangles + (tile.triangles - tile.patched_triangles);
+  if (tile.coincident && tile.coincident->matter()) {
     write_kept_triangles(tables, tile, triangles);
-  else
+    write_kept_patched_triangles(context.world.mirrored, tile, patched);
+  } else {
     write_triangles(tables, tile, triangles);
-  if (tile.patched.size() > 0)
-    write_patched_triangles(context.world.mirrored, tile,
-                            triangles + (tile.triangles - tile.patched_triangles));
+    if (tile.patched.size() > 0) write_patched_triangles(context.world.mirrored, tile, patched);
+  }
 }
 
 }  // namespace HWY_NAMESPACE

@@ -233,9 +233,6 @@ class Builder {
   explicit Builder(TopologyTables& tables) : tables_(tables) {
     tables.patches[patches_++] = {};
     for (int index = 0; index < 256; ++index) add_case(index);
-    for (int f = 0; f < 6; ++f)
-      for (int i = 0; i < 4; ++i)
-        tables.faces[f][i] = static_cast<std::uint8_t>(case_rule::kFaces[f][i]);
   }
 
  private:
@@ -243,7 +240,12 @@ class Builder {
     const int ambiguous = case_rule::ambiguous_faces(index);
     CaseConfigurations& of_case = tables_.cases[index];
     of_case.first = static_cast<std::uint16_t>(configurations_);
-    of_case.ambiguous = static_cast<std::uint8_t>(ambiguous);
+    for (int f = 0; f < 6; ++f) {
+      if (!(ambiguous >> f & 1)) continue;
+      for (int i = 0; i < 4; ++i)
+        of_case.corners[of_case.faces][i] = static_cast<std::uint8_t>(case_rule::kFaces[f][i]);
+      ++of_case.faces;
+    }
     of_case.needs_values = ambiguous != 0;
     // All choices of the ambiguous faces, in the order in which patch_of() counts them.
     for (int joined = 0;; joined = (joined - ambiguous) & ambiguous) {

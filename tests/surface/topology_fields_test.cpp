@@ -43,7 +43,7 @@ const std::vector<Kind>& kinds() {
          const double size = 1 + 0.05 * uniform(random);
          return random() % 2 ? size : -size;
        }},
-      {"bytes", 127.5, 0, [](auto& random) { return whole(random, 0, 255); }},
+      {"bytes", 127.5, 1e-6, [](auto& random) { return whole(random, 0, 255); }},
       {"two scales", 0, 0,
        [](auto& random) {
          const double size = random() % 2 ? uniform(random) : 0.05 * uniform(random);
