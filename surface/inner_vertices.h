@@ -65,8 +65,8 @@ ISOBRICK_HD inline CellPoint centre_of(const double (&d)[8], unsigned edges) {
     const int axis = e / 4, i = e & 1, j = e >> 1 & 1;
     const int first = axis == 0 ? 2 * i + 4 * j : axis == 1 ? i + 4 * j : i + 2 * j;
     const double a = d[first], b = d[first + (1 << axis)];
-    for (int k = 0; k < 3; ++k)
-      sum.p[k] += k == axis ? a / (a - b) : static_cast<double>(first >> k & 1);
+    const double t = a != b ? a / (a - b) : 0.5;  // what is tiny beside the rest may be lost
+    for (int k = 0; k < 3; ++k) sum.p[k] += k == axis ? t : static_cast<double>(first >> k & 1);
     ++count;
   }
   for (double& v : sum.p) v /= count;

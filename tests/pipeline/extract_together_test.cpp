@@ -205,6 +205,16 @@ TEST_F(ExtractTogether, DegenerateTrianglesAreLeftOutOfEach) {
   expect_same(make_together(reader, options, requests), alone);
 }
 
+TEST_F(ExtractTogether, EachFollowsTheInterpolant) {
+  const auto field = noise_and_waves<std::uint8_t>({100, 81, 70});
+  const StoreReader reader = store(field, {.brick = 32, .shard = 64});
+  for (const bool drop : {false, true}) {
+    const ExtractOptions options{
+        .drop_degenerate = drop, .topology = Topology::trilinear, .threads = 2};
+    expect_same(make_together(reader, options, kRequests), make_alone(reader, options, kRequests));
+  }
+}
+
 TEST_F(ExtractTogether, RegionsLevelsAndNaN) {
   auto field = noise_and_waves<float>({100, 90, 80});
   for_each_point({{30, 10, 20}, {60, 40, 50}}, [&](Int3 p) {
