@@ -62,14 +62,37 @@ constexpr std::array<std::uint8_t, 12> faces_of_edges() {
   return faces;
 }
 
-/// For each active edge of a case, the edge that follows it around its loop; −1 elsewhere.
-constexpr std::array<int, 12> successors(int index) {
+/// All faces of a cell, as bits.
+inline constexpr int kAllFaces = 63;
+
+/// The faces of a case whose inside corners touch across a diagonal only, as bits.
+constexpr int ambiguous_faces(int index) {
   const auto inside = [index](int corner) { return (index >> corner & 1) != 0; };
+  int faces = 0;
+  for (int f = 0; f < 6; ++f)
+    if (const auto& c = kFaces[f]; inside(c[0]) == inside(c[2]) && inside(c[1]) == inside(c[3]) &&
+                                   inside(c[0]) != inside(c[1]))
+      faces |= 1 << f;
+  return faces;
+}
+
+/// For each active edge of a case, the edge that follows it around its loop; −1 elsewhere. The
+/// inside of the ambiguous faces among `joined` stays in one piece, that of the others does not.
+constexpr std::array<int, 12> successors(int index, int joined = kAllFaces) {
+  const auto inside = [index](int corner) { return (index >> corner & 1) != 0; };
+  const int separate = ambiguous_faces(index) & ~joined;
   std::array<int, 12> next{};
   next.fill(-1);
-  for (const auto& face : kFaces)
+  for (int f = 0; f < 6; ++f)
     for (int i = 0; i < 4; ++i) {
+      const auto& face = kFaces[f];
       const int before = face[(i + 3) % 4], first = face[i];
+      if (separate >> f & 1) {
+        if (inside(first))
+          next[static_cast<std::size_t>(edge_between(before, first))] =
+              edge_between(first, face[(i + 1) % 4]);
+        continue;
+      }
       if (!inside(before) || inside(first)) continue;
       int last = i;  // the group of outside corners is face[i … last]
       while (!inside(face[(last + 1) % 4])) ++last;
@@ -84,10 +107,24 @@ struct Loop {
   int size = 0;
 };
 
+/// Takes the loop that begins at an edge out of the successors; empty where there is none.
+constexpr Loop take_loop(std::array<int, 12>& next, int start) {
+  Loop loop;
+  for (int e = start; next[static_cast<std::size_t>(e)] >= 0;) {
+    loop.edge[static_cast<std::size_t>(loop.size++)] = e;
+    const int following = next[static_cast<std::size_t>(e)];
+    next[static_cast<std::size_t>(e)] = -1;
+    e = following;
+  }
+  return loop;
+}
+
+/// Room for the triangles of one loop.
+using Corners = std::array<std::uint8_t, 30>;
+
 /// Triangulates loop[first … last], whose side first–last is given, appending
 /// to `out`. False when every way needs a diagonal inside a face.
-constexpr bool triangulate(const Loop& loop, int first, int last, std::array<std::uint8_t, 16>& out,
-                           int& used) {
+constexpr bool triangulate(const Loop& loop, int first, int last, Corners& out, int& used) {
   constexpr auto faces = faces_of_edges();
   if (last - first < 2) return true;
   const auto allowed = [&](int i, int j) {
@@ -130,21 +167,16 @@ constexpr CaseTables make_case_tables() {
   CaseTables tables;
   for (int index = 0; index < 256; ++index) {
     auto next = case_rule::successors(index);
-    std::array<std::uint8_t, 16> edges{};
+    case_rule::Corners corners{};
     int used = 0;
     for (int start = 0; start < 12; ++start) {
-      case_rule::Loop loop;
-      for (int e = start; next[static_cast<std::size_t>(e)] >= 0;) {
-        loop.edge[static_cast<std::size_t>(loop.size++)] = e;
-        const int following = next[static_cast<std::size_t>(e)];
-        next[static_cast<std::size_t>(e)] = -1;
-        e = following;
-      }
-      if (loop.size > 0 && !case_rule::triangulate(loop, 0, loop.size - 1, edges, used))
+      const case_rule::Loop loop = case_rule::take_loop(next, start);
+      if (loop.size > 0 && !case_rule::triangulate(loop, 0, loop.size - 1, corners, used))
         throw "a loop has no triangulation off the faces";
     }
     if (used > 3 * kMaxCaseTriangles) throw "too many triangles";
-    for (int i = used; i < 16; ++i) edges[static_cast<std::size_t>(i)] = 15;
+    std::array<std::uint8_t, 16> edges{};
+    for (std::size_t i = 0; i < 16; ++i) edges[i] = static_cast<int>(i) < used ? corners[i] : 15;
     tables.triangles[static_cast<std::size_t>(index)] = static_cast<std::uint8_t>(used / 3);
     tables.edges[static_cast<std::size_t>(index)] = edges;
   }

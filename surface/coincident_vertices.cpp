@@ -6,6 +6,7 @@
 
 #include "core/morton.h"
 #include "core/threshold.h"
+#include "surface/patched_cells.h"
 
 namespace isobrick::inline v0 {
 namespace {
@@ -29,24 +30,34 @@ constexpr bool on_planes(std::uint32_t place) {
 void mark_used(TileState& tile) {
   CoincidentVertices& coincident = *tile.coincident;
   std::memset(coincident.used, 0, sizeof coincident.used);
-  coincident.left_out = 0;
-  for (const ActiveCell cell : tile.cells) {
+  coincident.left_out = coincident.patched_left_out = 0;
+  // Returns how many of a cell's triangles are left out.
+  const auto mark = [&](ActiveCell cell, const std::uint8_t* edges, int triangles) {
     const int x = static_cast<int>(cell & 31), y = static_cast<int>(cell >> 5 & 31),
               z = static_cast<int>(cell >> 10 & 31);
     const std::uint32_t at = coincident::corner_bits(coincident.at, x, y, z);
-    if (at == 0) continue;
+    if (at == 0) return std::uint32_t{0};
     const auto use = [&](int vertex) {
       if (vertex >= 8) return;
       const int row = row_index(y + (vertex >> 1 & 1), z + (vertex >> 2));
       coincident.used[row] |= std::uint64_t{1} << (x + (vertex & 1));
     };
+    return coincident::for_each_kept(edges, triangles, at, [&](int a, int b, int c) {
+      use(a);
+      use(b);
+      use(c);
+    });
+  };
+  for (const ActiveCell cell : tile.cells)
     coincident.left_out +=
-        coincident::for_each_kept(kCaseTables, cell >> 16, at, [&](int a, int b, int c) {
-          use(a);
-          use(b);
-          use(c);
-        });
+        mark(cell, kCaseTables.edges[cell >> 16].data(), kCaseTables.triangles[cell >> 16]);
+  if (tile.patched.size() == 0) return;
+  const TopologyTables& tables = topology_tables();
+  for (const PatchedCell& cell : tile.patched) {
+    const CellPatch& patch = tables.patches[cell.patch];
+    coincident.patched_left_out += mark(cell.cell, tables.corners + patch.first, patch.triangles);
   }
+  coincident.left_out += coincident.patched_left_out;
 }
 
 /// Finds out which tile makes the vertex on a coincident vertex: the first in Morton order that
@@ -88,19 +99,28 @@ class CoincidentOwner {
   }
 
   bool has_triangle(Int3 cell, int corner) const {
+    const int x = static_cast<int>(cell.x), y = static_cast<int>(cell.y),
+              z = static_cast<int>(cell.z);
     std::uint32_t index = 0, at = 0;
     for (int c = 0; c < 8; ++c) {
-      const T v = samples_[TileLayout::offset(static_cast<int>(cell.x) + (c & 1),
-                                              static_cast<int>(cell.y) + (c >> 1 & 1),
-                                              static_cast<int>(cell.z) + (c >> 2))];
+      const T v = samples_[TileLayout::offset(x + (c & 1), y + (c >> 1 & 1), z + (c >> 2))];
       if (v != v) return false;
       index |= static_cast<std::uint32_t>(v >= threshold_) << c;
       at |= static_cast<std::uint32_t>(v == coincident_) << c;
     }
     bool found = false;
-    coincident::for_each_kept(kCaseTables, index, at, [&](int a, int b, int c) {
+    const auto look_at = [&](int a, int b, int c) {
       found = found || a == corner || b == corner || c == corner;
-    });
+    };
+    if (!context_.trilinear) {
+      coincident::for_each_kept(kCaseTables, index, at, look_at);
+      return found;
+    }
+    const TopologyTables& tables = topology_tables();
+    const CellValues<T> values(samples_, context_.isovalue, x, y, z);
+    const CellPatch& patch =
+        tables.patches[cell_topology::patch_of(tables, static_cast<int>(index), values.d)];
+    coincident::for_each_kept(tables.corners + patch.first, patch.triangles, at, look_at);
     return found;
   }
 
@@ -125,7 +145,7 @@ void list_used(const KernelContext& context, bool unwelded, TileState& tile) {
                               CoincidentVertex::kOwn};
       if (!unwelded && on_planes(vertex.place)) vertex.owner = owner.find({x, y, z});
       if (vertex.owner == CoincidentVertex::kOwn)
-        vertex.number = tile.edge_vertices + coincident.own++;
+        vertex.number = tile.edge_vertices + tile.inner_vertices + coincident.own++;
       coincident.vertices.resize(coincident.vertices.size() + 1);
       coincident.vertices[coincident.vertices.size() - 1] = vertex;
     }
@@ -145,8 +165,9 @@ void count_coincident(ScalarType type, const KernelContext& context, bool unweld
   mark_used(tile);
   visit_scalar(type,
                [&](auto tag) { list_used<typename decltype(tag)::type>(context, unwelded, tile); });
-  tile.vertices = tile.edge_vertices + tile.coincident->own;
+  tile.vertices = tile.edge_vertices + tile.inner_vertices + tile.coincident->own;
   tile.triangles -= tile.coincident->left_out;
+  tile.patched_triangles -= tile.coincident->patched_left_out;
 }
 
 void publish_coincident(TileState& tile) {

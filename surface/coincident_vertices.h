@@ -2,6 +2,7 @@
 
 #include <array>
 #include <optional>
+#include <utility>
 
 #include "surface/boundary_map.h"
 #include "surface/case_tables.h"
@@ -45,19 +46,19 @@ inline constexpr auto kEdgeCorners = [] {
 
 /// The vertex on an active edge of a cell whose coincident vertices are the bits `at`: the
 /// corner that is a coincident vertex, or 8 + edge. Only one end of an active edge can be one.
+/// What is no edge is an inner vertex, which never is one.
 constexpr int vertex_on(int edge, std::uint32_t at) {
+  if (edge >= 12) return 8 + edge;
   const auto [a, b] = kEdgeCorners[static_cast<std::size_t>(edge)];
   return at >> a & 1 ? a : at >> b & 1 ? b : 8 + edge;
 }
 
-/// Calls f(a, b, c) with the vertices of each triangle of a case that is kept;
+/// Calls f(a, b, c) with the vertices of each of `n` triangles on these edges that is kept;
 /// the number of those that are not.
 template <class F>
-constexpr std::uint32_t for_each_kept(const CaseTables& tables, std::uint32_t index,
-                                      std::uint32_t at, F&& f) {
+constexpr std::uint32_t for_each_kept(const std::uint8_t* edges, int n, std::uint32_t at, F&& f) {
   std::uint32_t left_out = 0;
-  const std::uint8_t* edges = tables.edges[index].data();
-  for (int n = tables.triangles[index]; n > 0; --n, edges += 3) {
+  for (; n > 0; --n, edges += 3) {
     const int a = vertex_on(edges[0], at), b = vertex_on(edges[1], at), c = vertex_on(edges[2], at);
     if (a != b && b != c && c != a)
       f(a, b, c);
@@ -65,6 +66,13 @@ constexpr std::uint32_t for_each_kept(const CaseTables& tables, std::uint32_t in
       ++left_out;
   }
   return left_out;
+}
+
+/// The same for the triangles of a case.
+template <class F>
+constexpr std::uint32_t for_each_kept(const CaseTables& tables, std::uint32_t index,
+                                      std::uint32_t at, F&& f) {
+  return for_each_kept(tables.edges[index].data(), tables.triangles[index], at, std::forward<F>(f));
 }
 
 /// The eight bits of a cell at (x, y, z) from rows of bits, in the order of its corners.
@@ -77,9 +85,9 @@ constexpr std::uint32_t corner_bits(const std::uint64_t* rows, int x, int y, int
 
 }  // namespace coincident
 
-/// After count_tile: leaves triangles out, finds the coincident vertices that the rest has
-/// corners on and the tile that makes each one's vertex, and completes the counts.
-/// `unwelded`: no tile shares vertices with another.
+/// After count_tile and count_patched_cells: leaves triangles out, finds the coincident vertices
+/// that the rest has corners on and the tile that makes each one's vertex, and completes the
+/// counts. `unwelded`: no tile shares vertices with another.
 void count_coincident(ScalarType type, const KernelContext& context, bool unwelded,
                       TileState& tile);
 

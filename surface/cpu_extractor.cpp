@@ -15,6 +15,7 @@
 #include "surface/case_rule.h"
 #include "surface/chunk_writer.h"
 #include "surface/coincident_vertices.h"
+#include "surface/patched_cells.h"
 #include "surface/tile_kernels.h"
 #include "surface/tile_samples.h"
 #include "surface/world_map.h"
@@ -74,9 +75,9 @@ struct CpuExtractor::Impl {
     if (options.roi.empty()) throw UsageError("the region of interest holds no sample");
     options.may_have_nan = o.may_have_nan && is_floating(l.type);
     options.drop_degenerate = o.drop_degenerate && has_coincident(l.type, o.isovalue);
-    context = {o.isovalue, world_map(o.transform, o.inside),
-               o.normals,  options.may_have_nan,
-               l.extent,   options.roi};
+    context = {
+        o.isovalue,  world_map(o.transform, o.inside), o.normals, options.may_have_nan, l.extent,
+        options.roi, o.topology == Topology::trilinear};
     first_tile = tile_of(options.roi.lo);
     if (sink) writer.emplace(*sink);
   }
@@ -110,6 +111,7 @@ struct CpuExtractor::Impl {
     state.work = work;
     state.vertices = state.triangles = 0;
     state.cells.clear();
+    state.clear_patched();
     // Another extractor may have left its own, or none.
     if (options.drop_degenerate != (state.coincident != nullptr))
       state.coincident = options.drop_degenerate ? std::make_unique<CoincidentVertices>() : nullptr;
@@ -120,6 +122,7 @@ struct CpuExtractor::Impl {
       if (options.may_have_nan) state.work.active_blocks = 0xff;
       gather(state, samples);
       count_tile(lattice.type, context, state);
+      if (context.trilinear) count_patched_cells(lattice.type, context, state);
       if (state.coincident) count_coincident(lattice.type, context, !welded(), state);
     }
     if (!state.boundary) return;
@@ -258,14 +261,20 @@ std::size_t CpuExtractor::preferred_batch(int threads) {
   return kTilesPerThread * static_cast<std::size_t>(threads);
 }
 
+MeshSize CpuExtractor::max_in_cell(Topology topology) {
+  if (topology == Topology::trilinear) return {kMaxPatchInner, kMaxPatchTriangles};
+  return {0, kMaxCaseTriangles};
+}
+
 // As if every edge of a tile had a vertex and every cell a triangle: any input fits. With the
 // boundary, which waits at least until the batch is over.
-std::uint64_t CpuExtractor::workspace_bytes(ScalarType type, bool drop_degenerate) {
+std::uint64_t CpuExtractor::workspace_bytes(ScalarType type, bool drop_degenerate,
+                                            Topology topology) {
   const std::uint64_t coincident =
       sizeof(CoincidentVertices) + kTileRows * kTileSamples * sizeof(CoincidentVertex);
   return sizeof(TileState) + boundary_bytes_of_tile(drop_degenerate) +
-         TileLayout::kSize * size_of(type) +
-         kTileEdge * kTileEdge * kTileEdge * sizeof(ActiveCell) +
+         TileLayout::kSize * size_of(type) + kTileVolume * sizeof(ActiveCell) +
+         (topology == Topology::trilinear ? kTileVolume * sizeof(PatchedCell) : 0) +
          kMaxEdges * sizeof(std::uint32_t) + (drop_degenerate ? coincident : 0);
 }
 
@@ -273,9 +282,10 @@ std::uint64_t CpuExtractor::boundary_bytes(Int3 tiles, bool drop_degenerate) {
   return BoundaryMap::max_size(tiles) * boundary_bytes_of_tile(drop_degenerate);
 }
 
-std::uint64_t CpuExtractor::max_tile_output(bool normals) {
-  return kMaxEdges * sizeof(Vec3f) * (normals ? 2 : 1) +
-         std::uint64_t{kMaxCaseTriangles} * kTileEdge * kTileEdge * kTileEdge * sizeof(Triangle);
+std::uint64_t CpuExtractor::max_tile_output(bool normals, Topology topology) {
+  const MeshSize of_cell = max_in_cell(topology);
+  return (kMaxEdges + of_cell.vertices * kTileVolume) * sizeof(Vec3f) * (normals ? 2 : 1) +
+         of_cell.triangles * kTileVolume * sizeof(Triangle);
 }
 
 }  // namespace isobrick

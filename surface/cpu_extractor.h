@@ -72,11 +72,13 @@ class CpuExtractor final : public SurfaceExtractor {
   /// Tiles between two hand-offs that keep `threads` busy and their caches warm.
   static std::size_t preferred_batch(int threads);
   /// Bytes of work space for one tile, with its boundary.
-  static std::uint64_t workspace_bytes(ScalarType type, bool drop_degenerate);
+  static std::uint64_t workspace_bytes(ScalarType type, bool drop_degenerate, Topology topology);
   /// Bytes of finished tiles that wait for later tiles at most, mostly: of a grid of tiles.
   static std::uint64_t boundary_bytes(Int3 tiles, bool drop_degenerate);
   /// Bytes of output that one tile can make at most.
-  static std::uint64_t max_tile_output(bool normals);
+  static std::uint64_t max_tile_output(bool normals, Topology topology);
+  /// Vertices within a cell and triangles that one cell can make at most.
+  static MeshSize max_in_cell(Topology topology);
 
  private:
   struct Impl;

@@ -12,6 +12,7 @@
 #include "core/simd_targets.h"
 #include "surface/case_tables.h"
 #include "surface/coincident_vertices-inl.h"
+#include "surface/patched_cells-inl.h"
 #include "surface/tile_count-inl.h"
 #include "surface/tile_triangles-inl.h"
 #include "surface/tile_vertices-inl.h"
@@ -30,15 +31,27 @@ void Write(ScalarType type, const KernelContext& context, TileState& tile, Vec3f
   visit_scalar(type, [&](auto tag) {
     using T = typename decltype(tag)::type;
     write_vertices<T>(context, tile, positions, normals);
+    const auto write_from = [&](std::uint32_t first, const auto& write) {
+      write(positions + first, normals ? normals + first : nullptr);
+    };
+    if (tile.inner_vertices > 0)
+      write_from(tile.edge_vertices, [&](Vec3f* to, Vec3f* normals_to) {
+        write_inner_vertices<T>(context, tile, to, normals_to);
+      });
     if (tile.coincident)
-      write_coincident_vertices<T>(context, tile, positions + tile.edge_vertices,
-                                   normals ? normals + tile.edge_vertices : nullptr);
+      write_from(tile.edge_vertices + tile.inner_vertices, [&](Vec3f* to, Vec3f* normals_to) {
+        write_coincident_vertices<T>(context, tile, to, normals_to);
+      });
   });
   const CaseTables& tables = context.world.mirrored ? kMirroredCaseTables : kCaseTables;
-  if (tile.coincident && tile.coincident->matter())
+  Triangle* const patched = triangles + (tile.triangles - tile.patched_triangles);
+  if (tile.coincident && tile.coincident->matter()) {
     write_kept_triangles(tables, tile, triangles);
-  else
+    write_kept_patched_triangles(context.world.mirrored, tile, patched);
+  } else {
     write_triangles(tables, tile, triangles);
+    if (tile.patched.size() > 0) write_patched_triangles(context.world.mirrored, tile, patched);
+  }
 }
 
 }  // namespace HWY_NAMESPACE

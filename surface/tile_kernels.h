@@ -11,8 +11,9 @@ struct KernelContext {
   WorldMap world;
   bool normals = false;
   bool may_have_nan = false;
-  Int3 extent;  ///< of the volume: gradients are one-sided at its border
-  Box3 roi;     ///< samples between which there are cells
+  Int3 extent;             ///< of the volume: gradients are one-sided at its border
+  Box3 roi;                ///< samples between which there are cells
+  bool trilinear = false;  ///< Topology::trilinear
 };
 
 // The two passes over one tile, compiled for several instruction sets; the best

@@ -55,6 +55,12 @@ struct EdgeRow {
 /// A cell that the surface passes: x | y << 5 | z << 10 | case << 16.
 using ActiveCell = std::uint32_t;
 
+/// An active cell whose surface is not that of its case alone.
+struct PatchedCell {
+  ActiveCell cell;
+  std::uint32_t patch;  ///< of TopologyTables
+};
+
 /// A vertex on the upper x face: row (y, z) and number within the tile.
 struct FaceVertex {
   std::uint16_t row;
@@ -95,10 +101,11 @@ struct CoincidentVertices {
   PodBuffer<CoincidentVertex> vertices;  ///< the used ones, by place
   std::uint32_t own = 0;                 ///< of them made by this tile
   std::uint32_t left_out = 0;            ///< triangles
+  std::uint32_t patched_left_out = 0;    ///< of them those of patched cells
 
   void clear() {
     vertices.clear();
-    own = left_out = 0;
+    own = left_out = patched_left_out = 0;
   }
   /// Whether a triangle has a corner on a coincident vertex, or had before it was left out.
   bool matter() const { return vertices.size() > 0 || left_out > 0; }
@@ -121,12 +128,19 @@ struct TileState {
   PodBuffer<std::uint32_t>
       edges;  ///< own edges in the order of their vertices: x | y << 6 | z << 12 | axis << 18
   std::uint32_t vertices = 0, triangles = 0;
-  std::uint32_t edge_vertices = 0;  ///< vertices on edges; those on coincident vertices follow them
+  std::uint32_t edge_vertices = 0;   ///< vertices on edges; inner ones follow, then coincident ones
+  std::uint32_t inner_vertices = 0;  ///< of patched cells
+  PodBuffer<PatchedCell> patched;    ///< cells that are not in `cells`; of Topology::trilinear
+  std::uint32_t patched_triangles = 0;               ///< of `triangles`, the last ones
   std::unique_ptr<CoincidentVertices> coincident;    ///< where degenerate triangles are left out
   std::uint64_t vertex_base = 0, triangle_base = 0;  ///< where this tile's output goes
   std::uint32_t number_base = 0;                     ///< what its vertices are numbered from
   TileBoundary* boundary = nullptr;                  ///< of this tile, when later tiles need it
 
+  void clear_patched() {
+    patched.clear();
+    inner_vertices = patched_triangles = 0;
+  }
   EdgeRow& write_row(int y, int z) {
     written[z] |= std::uint64_t{1} << y;
     return rows[row_index(y, z)];

@@ -69,6 +69,30 @@ struct WideRow {
   }
 };
 
+/// The vertex numbers of the edges of cells that come row by row.
+class CellNumbers {
+ public:
+  HWY_INLINE explicit CellNumbers(const TileState& tile) : rows_(tile.rows) {}
+
+  /// Those that are not active get anything.
+  HWY_INLINE void find(ActiveCell cell, std::uint32_t (&numbers)[16]) {
+    if ((cell >> 5 & 0x3ff) != place_) {
+      place_ = cell >> 5 & 0x3ff;
+      row_.load(rows_, static_cast<int>(place_ & 31), static_cast<int>(place_ >> 5));
+    }
+    const Wide d;
+    const std::uint32_t x = cell & 31;
+    const auto before = hn::And(row_.words, hn::Load(d, kBefore.at[x]));
+    hn::StoreU(hn::Add(x == 0 ? row_.bases_at_0 : row_.bases, hn::PopulationCount(before)), d,
+               numbers);
+  }
+
+ private:
+  const EdgeRow* rows_;
+  WideRow row_;
+  ActiveCell place_ = ~ActiveCell{0};
+};
+
 inline void write_triangles(const CaseTables& tables, const TileState& tile, Triangle* out) {
   const Wide d;
   WideRow row;
@@ -138,16 +162,31 @@ HWY_INLINE void cell_vertices(const CellRow& row, std::uint32_t x, std::uint32_t
   }
 }
 
+/// The vertex numbers of the edges of cells that come row by row.
+class CellNumbers {
+ public:
+  HWY_INLINE explicit CellNumbers(const TileState& tile) : rows_(tile.rows) {}
+
+  /// Those that are not active get anything.
+  HWY_INLINE void find(ActiveCell cell, std::uint32_t (&numbers)[16]) {
+    if ((cell >> 5 & 0x3ff) != place_) {
+      place_ = cell >> 5 & 0x3ff;
+      row_.load(rows_, static_cast<int>(place_ & 31), static_cast<int>(place_ >> 5));
+    }
+    cell_vertices(row_, cell & 31, numbers);
+  }
+
+ private:
+  const EdgeRow* rows_;
+  CellRow row_;
+  ActiveCell place_ = ~ActiveCell{0};
+};
+
 inline void write_triangles(const CaseTables& tables, const TileState& tile, Triangle* out) {
-  CellRow row;
-  ActiveCell place = ~ActiveCell{0};
+  CellNumbers numbers(tile);
   alignas(64) std::uint32_t ids[16];
   for (const ActiveCell cell : tile.cells) {
-    if ((cell >> 5 & 0x3ff) != place) {
-      place = cell >> 5 & 0x3ff;
-      row.load(tile.rows, static_cast<int>(place & 31), static_cast<int>(place >> 5));
-    }
-    cell_vertices(row, cell & 31, ids);
+    numbers.find(cell, ids);
     const std::uint32_t index = cell >> 16;
     const std::uint8_t* edges = tables.edges[index].data();
     for (int n = tables.triangles[index]; n > 0; --n, edges += 3)

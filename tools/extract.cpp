@@ -250,6 +250,11 @@ void add_extract(Program& program) {
               .may_be_bare = true});
   add_flag(app, "--drop-degenerate", arguments->drop_degenerate,
            "Leave out triangles without area where samples equal the isovalue");
+  add_parsed(app, arguments->topology, parse_topology,
+             {"--topology", "consistent|trilinear",
+              "How the surface passes where corners allow several ways: by a rule for faces, or as "
+              "the trilinear interpolant does, tunnels included (on the CPU)",
+              "consistent"});
   add_search(app, arguments->search);
   add_memory(app, arguments->memory);
   add_threads(app, arguments->threads);

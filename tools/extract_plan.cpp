@@ -91,6 +91,7 @@ ExtractOptions common_options(const ExtractArguments& arguments) {
   ExtractOptions options;
   options.inside = arguments.inside;
   options.drop_degenerate = arguments.drop_degenerate;
+  options.topology = arguments.topology;
   // The driver is there from when a picture is opened, before anything is extracted.
   if (!arguments.preview.path.empty() && !arguments.estimate)
     options.memory_of_others = preview_driver_memory();
@@ -255,8 +256,9 @@ void check_space(const std::vector<ExtractedSurface>& surfaces, const StoreReade
   std::vector<double> isovalues;
   for (const ExtractedSurface& surface : surfaces) isovalues.push_back(surface.options.isovalue);
   const std::vector<ActiveParts> active = count_active(store, surfaces.front().options, isovalues);
-  const auto largest = planned_meshes(
-      surfaces, [&](std::size_t i) { return PlannedMesh{.size = largest_mesh(active[i])}; });
+  const auto largest = planned_meshes(surfaces, [&](std::size_t i) {
+    return PlannedMesh{.size = largest_mesh(active[i], surfaces[i].options.topology)};
+  });
   if (!find_shortage(largest, free_space)) return;
   const auto likely = planned_meshes(surfaces, [&](std::size_t i) {
     const ExtractEstimate guess = estimate_one(surfaces[i], store);

@@ -28,6 +28,7 @@ struct ExtractArguments {
   std::optional<Inside> inside;
   std::optional<bool> normals;  ///< nothing: where the format holds them
   bool drop_degenerate = false;
+  Topology topology = Topology::consistent;
   std::uint64_t memory = std::uint64_t{1} << 30;
   int threads = 0;
   IndexChoice search;

@@ -119,6 +119,12 @@ Inside parse_inside(std::string_view text) {
   throw UsageError(fmt::format("'{}' is no side of a surface; it is above or below", text));
 }
 
+Topology parse_topology(std::string_view text) {
+  if (text == "consistent") return Topology::consistent;
+  if (text == "trilinear") return Topology::trilinear;
+  throw UsageError(fmt::format("'{}' is no topology; it is consistent or trilinear", text));
+}
+
 Backend parse_backend(std::string_view text) {
   if (text == "auto") return Backend::automatic;
   if (text == "cpu") return Backend::cpu;

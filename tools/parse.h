@@ -65,6 +65,9 @@ Backend parse_backend(std::string_view text);
 /// "above" or "below".
 Inside parse_inside(std::string_view text);
 
+/// "consistent" or "trilinear".
+Topology parse_topology(std::string_view text);
+
 /// "#RRGGBB", "white" or "black": sRGB in [0, 1].
 Vec3f parse_colour(std::string_view text);
 

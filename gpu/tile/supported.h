@@ -12,6 +12,8 @@ namespace isobrick::inline v0::gpu {
 inline std::optional<std::string> why_unsupported(const SurfaceOptions& options) {
   if (options.drop_degenerate)
     return "degenerate triangles cannot be left out on a GPU; use --backend cpu";
+  if (options.topology == Topology::trilinear)
+    return "the topology of the trilinear interpolant has no kernels; use --backend cpu";
   return std::nullopt;
 }
 

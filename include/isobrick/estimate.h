@@ -26,7 +26,8 @@ ISOBRICK_API std::vector<ActiveParts> count_active(const StoreReader& store,
                                                    std::span<const double> isovalues);
 
 /// What no mesh in these parts exceeds; real ones are mostly some ten times smaller.
-ISOBRICK_API MeshSize largest_mesh(const ActiveParts& active);
+ISOBRICK_API MeshSize largest_mesh(const ActiveParts& active,
+                                   Topology topology = Topology::consistent);
 
 /// What an extraction will need.
 struct ExtractEstimate {

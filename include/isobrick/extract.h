@@ -16,6 +16,7 @@
 #include <isobrick/progress.h>
 #include <isobrick/store_reader.h>
 #include <isobrick/surface_report.h>
+#include <isobrick/topology.h>
 
 namespace isobrick::inline v0 {
 
@@ -34,6 +35,7 @@ struct ExtractOptions {
   std::optional<Inside> inside = {};  ///< nothing: below the isovalue in a level set, else above
   bool normals = false;               ///< gradient normals
   bool drop_degenerate = false;       ///< see SurfaceOptions
+  Topology topology = Topology::consistent;       ///< how ambiguous cells are resolved
   std::uint64_t memory = std::uint64_t{1} << 30;  ///< hard budget, bytes
   /// Of the budget of the whole command what others take; messages name both together.
   std::uint64_t memory_of_others = 0;

@@ -3,6 +3,7 @@
 #include <isobrick/inside.h>
 #include <isobrick/lattice.h>
 #include <isobrick/mesh.h>
+#include <isobrick/topology.h>
 #include <isobrick/transform.h>
 
 namespace isobrick::inline v0 {
@@ -16,6 +17,7 @@ struct SurfaceOptions {
   /// Leaves triangles without area out where samples equal the isovalue: the
   /// vertices around such a sample become one, the mesh stays welded and closed.
   bool drop_degenerate = false;
+  Topology topology = Topology::consistent;  ///< of ambiguous cells
   /// Samples between which cells are looked at.
   Box3 roi = {};
   Transform transform = {};  ///< index space to world space

@@ -41,7 +41,7 @@ std::uint64_t max_level_set_bytes(const ActiveParts& active, const VolumeInfo& i
     leaves_of_triangle *= static_cast<std::uint64_t>((2 + 2 * reach) / 8) + 2;
   }
   const MeshSize mesh = largest_mesh(active);
-  const std::uint64_t tile = CpuExtractor::max_tile_output(false);
+  const std::uint64_t tile = CpuExtractor::max_tile_output(false, Topology::consistent);
   const std::uint64_t vertices = std::min(mesh.vertices, tile / sizeof(Vec3f)),
                       triangles = std::min(mesh.triangles, tile / sizeof(Triangle));
   // Vectors may have twice the room that they need; the list of leaves and triangles that are near

@@ -273,10 +273,12 @@ std::vector<ActiveParts> count_active(const StoreReader& store, const ExtractOpt
   return visit_active(store, request, options.level, isovalues, [](const TileWork&) {});
 }
 
-MeshSize largest_mesh(const ActiveParts& active) {
+MeshSize largest_mesh(const ActiveParts& active, Topology topology) {
   constexpr Index closed = kBlockEdge + 1;
-  return {3 * closed * closed * closed * active.active_blocks,
-          kMaxCaseTriangles * active.active_cells};
+  const MeshSize of_cell = CpuExtractor::max_in_cell(topology);
+  return {
+      3 * closed * closed * closed * active.active_blocks + of_cell.vertices * active.active_cells,
+      of_cell.triangles * active.active_cells};
 }
 
 ExtractEstimate estimate(const StoreReader& store, const ExtractOptions& options,

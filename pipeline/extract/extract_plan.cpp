@@ -27,6 +27,8 @@ constexpr std::uint64_t kDecoder = std::uint64_t{2} << 20;
 /// What the options of a pass's surfaces have in common.
 const ExtractRequest& common(PassRequests requests) { return requests.front(); }
 
+Topology topology_of(PassRequests requests) { return common(requests).surface.topology; }
+
 bool any_drops(PassRequests requests) {
   return std::any_of(requests.begin(), requests.end(),
                      [](const ExtractRequest& r) { return r.surface.drop_degenerate; });
@@ -34,8 +36,15 @@ bool any_drops(PassRequests requests) {
 
 /// The mesh that one tile can make, of the surface that takes most.
 std::uint64_t tile_output(PassRequests requests) {
-  return CpuExtractor::max_tile_output(std::any_of(
-      requests.begin(), requests.end(), [](const ExtractRequest& r) { return r.surface.normals; }));
+  const bool normals = std::any_of(requests.begin(), requests.end(),
+                                   [](const ExtractRequest& r) { return r.surface.normals; });
+  return CpuExtractor::max_tile_output(normals, topology_of(requests));
+}
+
+/// The work space for one tile.
+std::uint64_t workspace_bytes(PassRequests requests) {
+  return CpuExtractor::workspace_bytes(common(requests).level->lattice.type, any_drops(requests),
+                                       topology_of(requests));
 }
 
 /// The boundaries that wait between finished and unfinished tiles.
@@ -118,6 +127,7 @@ ExtractRequest check_request(const StoreReader& store, const ExtractOptions& opt
                      .normals = options.normals,
                      .indexing = indexing,
                      .drop_degenerate = options.drop_degenerate,
+                     .topology = options.topology,
                      .roi = roi,
                      .transform = request.level->transform,
                      .fill_value = info.fill_value,
@@ -147,8 +157,7 @@ Index reach_of(PassRequests requests) {
 std::uint64_t least_memory(PassRequests requests, std::uint64_t other_bytes) {
   const Lattice& lattice = common(requests).level->lattice;
   return fixed_bytes(common(requests)) + boundary_bytes(requests) + sink_bytes(requests) +
-         other_bytes + CpuExtractor::workspace_bytes(lattice.type, any_drops(requests)) +
-         2 * requests.size() * tile_output(requests) +
+         other_bytes + workspace_bytes(requests) + 2 * requests.size() * tile_output(requests) +
          max_bricks_of_tile(lattice, reach_of(requests)) * lattice.brick_bytes();
 }
 
@@ -162,7 +171,7 @@ std::size_t surfaces_of_pass(PassRequests requests, std::uint64_t budget,
 
 ExtractPlan plan_memory(PassRequests requests, std::uint64_t budget, std::uint64_t other_bytes) {
   const Lattice& lattice = common(requests).level->lattice;
-  const std::uint64_t workspace = CpuExtractor::workspace_bytes(lattice.type, any_drops(requests));
+  const std::uint64_t workspace = workspace_bytes(requests);
   const std::size_t tile_bricks = max_bricks_of_tile(lattice, reach_of(requests));
   const std::uint64_t brick_bytes = lattice.brick_bytes();
 

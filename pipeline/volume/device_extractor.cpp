@@ -38,6 +38,7 @@ SurfaceOptions surface_of(const ExtractOptions& options, const Lattice& lattice)
           .inside = options.inside.value_or(Inside::above),
           .normals = options.normals,
           .drop_degenerate = options.drop_degenerate,
+          .topology = options.topology,
           .roi = roi};
 }
 

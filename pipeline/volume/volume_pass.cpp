@@ -138,6 +138,7 @@ VolumePass::VolumePass(VolumeSamples& samples, const ExtractOptions& options, In
               .normals = options.normals,
               .indexing = indexing,
               .drop_degenerate = options.drop_degenerate,
+              .topology = options.topology,
               .roi = options.roi.value_or(lattice.box()),
               .transform = samples.transform};
   check_roi(surface_.roi, lattice.extent);
@@ -159,8 +160,9 @@ std::uint64_t VolumePass::fixed_bytes() const {
 void VolumePass::plan(bool has_sink, std::uint64_t sink_bytes) {
   const Lattice& lattice = samples_.lattice;
   const std::uint64_t workspace =
-      CpuExtractor::workspace_bytes(lattice.type, surface_.drop_degenerate);
-  const std::uint64_t tile_output = CpuExtractor::max_tile_output(surface_.normals);
+      CpuExtractor::workspace_bytes(lattice.type, surface_.drop_degenerate, surface_.topology);
+  const std::uint64_t tile_output =
+      CpuExtractor::max_tile_output(surface_.normals, surface_.topology);
   const auto region_bytes = [&](Index edge) -> std::uint64_t {
     if (samples_.array) return 0;
     const Int3 n = min(kOne * (edge * kTileEdge + 3), lattice.extent);

@@ -13,6 +13,7 @@ _Roi = Union[slice, tuple[slice, ...], None]
 _Bytes = Union[int, str]
 _Progress = Union[Callable[[str, int, int], object], Any, None]
 _Inside = Literal["above", "below"]
+_Topology = Literal["consistent", "trilinear"]
 _Backend = Literal["auto", "cpu", "cuda"]
 _Rotation = Union[Sequence[float], Sequence[Sequence[float]], NDArray[np.floating[Any]], None]
 _Numbers = Optional[Sequence[float]]
@@ -100,6 +101,7 @@ class Extractor:
         normals: bool = False,
         inside: _Inside = "above",
         drop_degenerate: bool = False,
+        topology: _Topology = "consistent",
         memory: _Bytes = ...,
         threads: int = 0,
         progress: _Progress = None,
@@ -113,6 +115,7 @@ class Extractor:
         normals: bool = False,
         inside: _Inside = "above",
         drop_degenerate: bool = False,
+        topology: _Topology = "consistent",
         memory: _Bytes = ...,
         threads: int = 0,
         progress: _Progress = None,
@@ -135,6 +138,7 @@ def extract(
     normals: bool = False,
     inside: _Inside = "above",
     drop_degenerate: bool = False,
+    topology: _Topology = "consistent",
     memory: _Bytes = ...,
     threads: int = 0,
     progress: _Progress = None,
@@ -211,6 +215,7 @@ class Volume:
         normals: bool = False,
         inside: Optional[_Inside] = None,
         drop_degenerate: bool = False,
+        topology: _Topology = "consistent",
         backend: _Backend = "auto",
         memory: _Bytes = ...,
         threads: int = 0,
@@ -228,6 +233,7 @@ class Volume:
         normals: bool = False,
         inside: Optional[_Inside] = None,
         drop_degenerate: bool = False,
+        topology: _Topology = "consistent",
         backend: _Backend = "auto",
         memory: _Bytes = ...,
         threads: int = 0,

@@ -137,7 +137,7 @@ def box_of(roi, shape):
 
 def extract_options(
     isovalue, *, box=None, level=0, normals=False, inside=None, drop_degenerate=False,
-    memory=2**30, threads=0, backend="auto", gpu_memory=0, device=0,
+    topology="consistent", memory=2**30, threads=0, backend="auto", gpu_memory=0, device=0,
 ):
     options = _isobrick.ExtractOptions()
     options.isovalue = number(isovalue, "isovalue")
@@ -148,6 +148,9 @@ def extract_options(
         raise UsageError(f"inside must be 'above', 'below' or None, not {inside!r}")
     options.inside = None if inside is None else getattr(_isobrick.Inside, inside)
     options.drop_degenerate = bool(drop_degenerate)
+    if topology not in ("consistent", "trilinear"):
+        raise UsageError(f"topology must be 'consistent' or 'trilinear', not {topology!r}")
+    options.topology = getattr(_isobrick.Topology, topology)
     options.memory = byte_count(memory)
     options.threads = thread_count(threads)
     if backend not in ("auto", "cpu", "cuda"):

@@ -85,7 +85,7 @@ class Extractor:
 
     def extract(
         self, isovalue, *, roi=None, normals=False, inside="above", drop_degenerate=False,
-        memory=2**30, threads=0, progress=None,
+        topology="consistent", memory=2**30, threads=0, progress=None,
     ):
         """The surface of an isovalue as a `Mesh`, or a `DeviceMesh` of an array on a device.
 
@@ -101,6 +101,9 @@ class Extractor:
             Which samples are inside: those of at least the isovalue, or those less than it.
         drop_degenerate : bool
             Leaves triangles without area out; not on a device.
+        topology : "consistent" or "trilinear"
+            How the surface passes where the corners of a cell allow several ways: by a rule for
+            faces, or as the trilinear interpolant does; not on a device.
         memory : int or str
             Budget in bytes, or a text such as "512M", for all but the array and the mesh. It does
             not bound device memory.
@@ -112,7 +115,7 @@ class Extractor:
         Raises UsageError (a ValueError) for a request that makes no sense.
         """
         options = self._options(
-            isovalue, roi, normals, inside, drop_degenerate, memory, threads
+            isovalue, roi, normals, inside, drop_degenerate, topology, memory, threads
         )
         if self._on_device:
             return DeviceMesh(self._native.extract(options))
@@ -121,7 +124,7 @@ class Extractor:
 
     def save(
         self, path, isovalue, *, roi=None, normals=False, inside="above", drop_degenerate=False,
-        memory=2**30, threads=0, progress=None, force=False, quantize=False,
+        topology="consistent", memory=2**30, threads=0, progress=None, force=False, quantize=False,
     ):
         """Streams a surface to a mesh file, so that the mesh may be larger than memory.
 
@@ -129,7 +132,7 @@ class Extractor:
         and faces in a dictionary.
         """
         options = self._options(
-            isovalue, roi, normals, inside, drop_degenerate, memory, threads
+            isovalue, roi, normals, inside, drop_degenerate, topology, memory, threads
         )
         file = mesh_file_options(force=force, quantize=quantize, threads=threads, memory=memory)
         if self._on_device:
@@ -137,7 +140,9 @@ class Extractor:
         with reporting(progress) as report:
             return self._native.save(options, path_text(path), file, report)
 
-    def _options(self, isovalue, roi, normals, inside, drop_degenerate, memory, threads):
+    def _options(
+        self, isovalue, roi, normals, inside, drop_degenerate, topology, memory, threads
+    ):
         if isinstance(isovalue, str):
             raise UsageError(
                 f"the isovalue of an array must be a number, not {isovalue!r}; "
@@ -145,7 +150,7 @@ class Extractor:
             )
         options = extract_options(
             isovalue, box=box_of(roi, self.shape), normals=normals, inside=inside,
-            drop_degenerate=drop_degenerate, memory=memory, threads=threads,
+            drop_degenerate=drop_degenerate, topology=topology, memory=memory, threads=threads,
         )
         if not self._on_device:
             options.memory_of_others = self._samples.set_memory(options.memory)
@@ -155,7 +160,7 @@ class Extractor:
 def extract(
     array, isovalue, *, spacing=None, origin=None, direction=None, unit=None, mask=None,
     nodata=None, stream=None, roi=None, normals=False, inside="above", drop_degenerate=False,
-    memory=2**30, threads=0, progress=None,
+    topology="consistent", memory=2**30, threads=0, progress=None,
 ):
     """The isosurface of an array [z, y, x] as a `Mesh`, or a `DeviceMesh` of one on a device.
 
@@ -163,7 +168,7 @@ def extract(
     ----------
     array, spacing, origin, direction, unit, mask, nodata, stream
         As of `Extractor`: arrays are indexed [z, y, x]; world space is x, y, z.
-    isovalue, roi, normals, inside, drop_degenerate, memory, threads, progress
+    isovalue, roi, normals, inside, drop_degenerate, topology, memory, threads, progress
         As of `Extractor.extract`.
 
     Examples
@@ -180,5 +185,5 @@ def extract(
     )
     return extractor.extract(
         isovalue, roi=roi, normals=normals, inside=inside, drop_degenerate=drop_degenerate,
-        memory=memory, threads=threads, progress=progress,
+        topology=topology, memory=memory, threads=threads, progress=progress,
     )

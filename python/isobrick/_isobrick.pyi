@@ -22,6 +22,10 @@ class Inside:
     above: Inside
     below: Inside
 
+class Topology:
+    consistent: Topology
+    trilinear: Topology
+
 class Backend:
     cpu: Backend
     cuda: Backend
@@ -33,6 +37,7 @@ class ExtractOptions:
     inside: Optional[Inside]
     normals: bool
     drop_degenerate: bool
+    topology: Topology
     memory: int
     memory_of_others: int
     threads: int

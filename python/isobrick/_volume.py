@@ -166,7 +166,7 @@ class Volume:
 
     def extract(
         self, isovalue, *, level=0, roi=None, normals=False, inside=None, drop_degenerate=False,
-        backend="auto", memory=2**30, threads=0, gpu_memory=0, device=0, progress=None,
+        topology="consistent", backend="auto", memory=2**30, threads=0, gpu_memory=0, device=0, progress=None,
     ):
         """The surface of an isovalue as a `Mesh`.
 
@@ -184,6 +184,9 @@ class Volume:
             Which samples are inside. None: below in a level set, else above.
         drop_degenerate : bool
             Leaves triangles without area out.
+        topology : "consistent" or "trilinear"
+            How the surface passes where the corners of a cell allow several ways: by a rule for
+            faces, or as the trilinear interpolant does; on the CPU.
         backend : "auto", "cpu" or "cuda"
             What makes the surface; the mesh is the same.
         memory, gpu_memory : int or str
@@ -195,16 +198,16 @@ class Volume:
         """
         options = self._options(
             isovalue, progress, level=level, roi=roi, normals=normals, inside=inside,
-            drop_degenerate=drop_degenerate, backend=backend, memory=memory, threads=threads,
-            gpu_memory=gpu_memory, device=device,
+            drop_degenerate=drop_degenerate, topology=topology, backend=backend, memory=memory,
+            threads=threads, gpu_memory=gpu_memory, device=device,
         )
         with reporting(progress) as report:
             return Mesh._of(self._native.extract(options, report))
 
     def save_mesh(
         self, path, isovalue, *, level=0, roi=None, normals=False, inside=None,
-        drop_degenerate=False, backend="auto", memory=2**30, threads=0, gpu_memory=0, device=0,
-        progress=None, force=False, quantize=False,
+        drop_degenerate=False, topology="consistent", backend="auto", memory=2**30, threads=0,
+        gpu_memory=0, device=0, progress=None, force=False, quantize=False,
     ):
         """Streams a surface to a mesh file, so that volume and mesh may be larger than memory.
 
@@ -213,8 +216,8 @@ class Volume:
         """
         options = self._options(
             isovalue, progress, level=level, roi=roi, normals=normals, inside=inside,
-            drop_degenerate=drop_degenerate, backend=backend, memory=memory, threads=threads,
-            gpu_memory=gpu_memory, device=device,
+            drop_degenerate=drop_degenerate, topology=topology, backend=backend, memory=memory,
+            threads=threads, gpu_memory=gpu_memory, device=device,
         )
         file = mesh_file_options(force=force, quantize=quantize, threads=threads, memory=memory)
         with reporting(progress) as report:

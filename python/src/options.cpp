@@ -28,6 +28,9 @@ void bind_transform(py::module_& module) {
 
 void bind_extract_options(py::module_& module) {
   py::enum_<Inside>(module, "Inside").value("above", Inside::above).value("below", Inside::below);
+  py::enum_<Topology>(module, "Topology")
+      .value("consistent", Topology::consistent)
+      .value("trilinear", Topology::trilinear);
   py::enum_<Backend>(module, "Backend")
       .value("auto", Backend::automatic)
       .value("cpu", Backend::cpu)
@@ -40,6 +43,7 @@ void bind_extract_options(py::module_& module) {
       .def_readwrite("inside", &ExtractOptions::inside)
       .def_readwrite("normals", &ExtractOptions::normals)
       .def_readwrite("drop_degenerate", &ExtractOptions::drop_degenerate)
+      .def_readwrite("topology", &ExtractOptions::topology)
       .def_readwrite("memory", &ExtractOptions::memory)
       .def_readwrite("memory_of_others", &ExtractOptions::memory_of_others)
       .def_readwrite("threads", &ExtractOptions::threads)

@@ -52,7 +52,7 @@ const std::map<std::string, Names> kPublicHeaders = {
     {"bricks/storage", {"storage"}},
     {"bricks/zarr", {"image_metadata", "level_info"}},
     {"index", {"index_kind"}},
-    {"surface", {"mesh", "mesh_sinks", "surface_options", "surface_report"}},
+    {"surface", {"mesh", "mesh_sinks", "surface_options", "surface_report", "topology"}},
     {"gpu/memory", {"device", "device_array"}},
     {"gpu/resident", {"device_mesh", "device_volume"}},
     {"pipeline/cache", {"open_volume"}},

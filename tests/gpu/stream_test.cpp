@@ -360,6 +360,7 @@ TEST(GpuExtractor, WhatHasNoKernelsIsRefused) {
         UsageError);
   };
   refused(ScalarType::u8, [](SurfaceOptions& o) { o.drop_degenerate = true; });
+  refused(ScalarType::u8, [](SurfaceOptions& o) { o.topology = Topology::trilinear; });
   refused(ScalarType::u8, [](SurfaceOptions& o) { o.isovalue = std::nan(""); });
   refused(ScalarType::u8, [](SurfaceOptions& o) { o.roi = {{99, 0, 0}, {100, 1, 1}}; });
 }

@@ -31,7 +31,7 @@ void expect_near(const StoreReader& store, const ExtractOptions& options, double
   EXPECT_NEAR(static_cast<double>(guess.mesh.vertices), static_cast<double>(mesh.vertices),
               most * static_cast<double>(mesh.vertices));
   EXPECT_LE(guess.uncertainty, 2 * most);
-  const MeshSize largest = largest_mesh(count_active(store, options));
+  const MeshSize largest = largest_mesh(count_active(store, options), options.topology);
   EXPECT_LE(mesh.triangles, largest.triangles);
   EXPECT_LE(mesh.vertices, largest.vertices);
 }
@@ -81,6 +81,8 @@ TEST_F(Estimate, NearOnNoiseAndWithNaN) {
   const Int3 extent{100, 131, 120};
   expect_near(store(extent, make_samples<std::uint16_t>(extent, 5), {.brick = 32, .shard = 64}),
               {.isovalue = 30000}, 0.05);
+  expect_near(store(extent, make_samples<std::uint16_t>(extent, 5), {.brick = 32, .shard = 64}),
+              {.isovalue = 30000, .topology = Topology::trilinear}, 0.05);
   auto samples = sampled<float>(extent, [](Int3 p) { return distance(p, 30, 60, 60); });
   for (std::size_t i = 0; i < samples.size(); i += 211) samples[i] = NAN;
   expect_near(store(extent, samples, {.brick = 64, .shard = 64}), {.isovalue = 45}, 0.1);

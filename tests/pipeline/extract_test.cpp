@@ -186,6 +186,29 @@ TEST_F(Extract, LeavesDegenerateTrianglesOutWhateverTheBudget) {
   }
 }
 
+TEST_F(Extract, FollowsTheInterpolantWhateverTheBudget) {
+  const auto field = mixed_field<std::uint8_t>({140, 120, 90});
+  constexpr Topology trilinear = Topology::trilinear;
+  isobrick::testing::Request request{.isovalue = 60, .normals = true, .topology = trilinear};
+  request.transform.spacing = {0.5, 1, 2};
+  const Mesh expected = isobrick::testing::extract(field, request);
+  request.topology = Topology::consistent;
+  ASSERT_GT(expected.positions.size(),
+            isobrick::testing::extract(field, request).positions.size() + 1000);
+  for (const Index brick : {16, 64}) {
+    const StoreReader reader = store(field, {.brick = brick, .shard = 64});
+    ExtractOptions options{.isovalue = 60, .normals = true, .topology = trilinear, .threads = 2};
+    const std::uint64_t least = min_extract_memory(reader, options, Indexing::welded, 0);
+    for (const std::uint64_t memory : {least, std::uint64_t{1} << 30}) {
+      MemorySink sink;
+      options.memory = memory;
+      const ExtractReport report = run(reader, options, sink);
+      EXPECT_EQ(sink.mesh, expected);
+      EXPECT_EQ(report.triangles, expected.triangles.size());
+    }
+  }
+}
+
 TEST_F(Extract, TheLeastBudgetWorksAndLessIsRefusedByName) {
   const auto field = mixed_field<std::uint16_t>({140, 120, 90});
   const StoreReader reader = store(field, {.brick = 32, .shard = 64});

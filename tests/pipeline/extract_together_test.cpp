@@ -205,6 +205,16 @@ TEST_F(ExtractTogether, DegenerateTrianglesAreLeftOutOfEach) {
   expect_same(make_together(reader, options, requests), alone);
 }
 
+TEST_F(ExtractTogether, EachFollowsTheInterpolant) {
+  const auto field = noise_and_waves<std::uint8_t>({100, 81, 70});
+  const StoreReader reader = store(field, {.brick = 32, .shard = 64});
+  for (const bool drop : {false, true}) {
+    const ExtractOptions options{
+        .drop_degenerate = drop, .topology = Topology::trilinear, .threads = 2};
+    expect_same(make_together(reader, options, kRequests), make_alone(reader, options, kRequests));
+  }
+}
+
 TEST_F(ExtractTogether, RegionsLevelsAndNaN) {
   auto field = noise_and_waves<float>({100, 90, 80});
   for_each_point({{30, 10, 20}, {60, 40, 50}}, [&](Int3 p) {
@@ -274,7 +284,7 @@ TEST_F(ExtractTogether, ABudgetWithoutRoomForAllTakesMorePasses) {
   expect_same(one_by_one, alone);
   for (std::size_t i = 0; i < kRequests.size(); ++i) EXPECT_EQ(one_by_one.reports[i].pass, i);
   const std::uint64_t of_surface =
-      2 * CpuExtractor::max_tile_output(true) + (std::uint64_t{4} << 20);
+      2 * CpuExtractor::max_tile_output(true, Topology::consistent) + (std::uint64_t{4} << 20);
   const Made in_pairs =
       make_together(reader, {.memory = least + of_surface, .threads = 2}, kRequests);
   expect_same(in_pairs, alone);

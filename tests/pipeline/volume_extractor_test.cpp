@@ -55,7 +55,8 @@ testing::Mesh expected_mesh(const Field<T>& field, const ExtractOptions& options
                                   .inside = options.inside.value_or(Inside::above),
                                   .normals = options.normals,
                                   .roi = options.roi,
-                                  .drop_degenerate = options.drop_degenerate});
+                                  .drop_degenerate = options.drop_degenerate,
+                                  .topology = options.topology});
 }
 
 template <class T>
@@ -318,10 +319,12 @@ TEST(VolumeExtractor, NodataIsTheNearestSample) {
 TYPED_TEST(VolumeOf, OptionsAreThoseOfAStore) {
   const auto field = testing::padded_noise<TypeParam>({50, 40, 36}, 0, 4, 0, 9);
   for (const Inside inside : {Inside::above, Inside::below})
-    for (const bool drop : {false, true}) {
-      const ExtractOptions options{.isovalue = 2, .inside = inside, .drop_degenerate = drop};
-      EXPECT_TRUE(same(extract(volume_of(field), options), expected_mesh(field, options)));
-    }
+    for (const bool drop : {false, true})
+      for (const Topology topology : {Topology::consistent, Topology::trilinear}) {
+        const ExtractOptions options{
+            .isovalue = 2, .inside = inside, .drop_degenerate = drop, .topology = topology};
+        EXPECT_TRUE(same(extract(volume_of(field), options), expected_mesh(field, options)));
+      }
 }
 
 TEST(VolumeExtractor, LaterIsovaluesAndRegionsUseWhatIsKnown) {

@@ -104,6 +104,12 @@ def test_options():
     assert signed_volume(below.vertices, below.faces) < 0
     whole = np.round(field)
     assert len(isobrick.extract(whole, 1, drop_degenerate=True)) < len(isobrick.extract(whole, 1))
+    noise = np.random.default_rng(1).random((9, 9, 9))
+    assert not same(
+        isobrick.extract(noise, 0.5), isobrick.extract(noise, 0.5, topology="trilinear")
+    )
+    with pytest.raises(isobrick.UsageError, match="trilinear"):
+        isobrick.extract(noise, 0.5, topology="other")
     for threads in (1, 3):
         assert same(isobrick.extract(field, 1, normals=True, threads=threads, memory="64M"), mesh)
 

@@ -6,6 +6,7 @@
 #include <isobrick/error.h>
 #include "core/morton.h"
 #include "surface/case_tables.h"
+#include "surface/cell_math.h"
 #include "tests/surface/field.h"
 
 namespace isobrick::testing {

@@ -77,6 +77,7 @@ struct Request {
   std::size_t batch = ~std::size_t{0};  ///< tiles a call
   std::size_t workspaces = 64;
   bool drop_degenerate = false;
+  Topology topology = Topology::consistent;
 };
 
 /// Our mesh of a field, through bricks, ranges and the CPU extractor.
@@ -92,6 +93,7 @@ Mesh extract(const Field<T>& field, const Request& request) {
   options.transform = request.transform;
   options.inside = request.inside;
   options.drop_degenerate = request.drop_degenerate;
+  options.topology = request.topology;
   if constexpr (std::is_floating_point_v<T>)
     for (const T v : field.samples) options.may_have_nan |= std::isnan(v);
   std::vector<TileWork> tiles;

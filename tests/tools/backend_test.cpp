@@ -102,10 +102,14 @@ TEST_F(Backend, WhatHasNoKernelsIsRefusedAndAutoTakesTheCpu) {
   const std::string store = make_store("a");
   expect_refused(on_cuda(store, {"--drop-degenerate"}), 2,
                  {"--backend cuda: ", "degenerate", "--backend cpu"});
+  expect_refused(on_cuda(store, {"--topology", "trilinear"}), 2,
+                 {"--backend cuda: ", "trilinear", "--backend cpu"});
   EXPECT_FALSE(std::filesystem::exists(path("a.ply")));
-  EXPECT_EQ(run_json({"extract", store, "--isovalue", "127.5", "-o", path("auto.ply"),
-                      "--drop-degenerate"})["surfaces"][0]["backend"],
-            "cpu");
+  for (const Arguments& option : {Arguments{"--drop-degenerate"}, {"--topology", "trilinear"}}) {
+    Arguments all{"extract", store, "--isovalue", "127.5", "-o", path("auto.ply"), "--force"};
+    all.insert(all.end(), option.begin(), option.end());
+    EXPECT_EQ(run_json(all)["surfaces"][0]["backend"], "cpu");
+  }
 }
 
 TEST_F(Backend, WithoutADeviceCudaIsRefusedAndAutoTakesTheCpu) {
