@@ -84,21 +84,11 @@ void check(const ExportArguments& arguments) {
     throw UsageError("a level set has one isosurface; give one --isovalue");
 }
 
-/// A zip holds the store as it is.
-void check_zip(const ExportArguments& arguments) {
-  const RegionArguments& part = arguments.region;
-  if (arguments.options.level != 0 || part.roi || part.region || !arguments.isovalues.empty())
-    throw UsageError(
-        "a zip holds the whole store; --level, --roi, --region and --isovalue go with .nrrd, .vdb "
-        "and .raw");
-}
-
 int run_export(const ExportArguments& arguments, Console& console) {
   check(arguments);
   const std::string out = arguments.out.empty() ? default_output(arguments) : arguments.out;
   ExportOptions options = arguments.options;
   options.format = format_of(out, arguments.format);
-  if (options.format == ExportFormat::zip) check_zip(arguments);
   if (is_standard_output(out)) console.reserve_output();
   const std::array<std::filesystem::path, 1> inputs{arguments.input.path};
   check_replaces_no_input(out, inputs);
@@ -107,7 +97,8 @@ int run_export(const ExportArguments& arguments, Console& console) {
                                         !arguments.isovalues.empty());
   const StoreReader& store = input.store();
   const Box3 box = store_region(store, options.level, arguments.region);
-  options.roi = box;
+  if (options.format != ExportFormat::zip || arguments.region.roi || arguments.region.region)
+    options.roi = box;
   if (!arguments.isovalues.empty())
     options.isovalue = resolve_isovalues(arguments.isovalues, store, console).front();
   options.half_band = arguments.half_band.value_or(options.half_band);

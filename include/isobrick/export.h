@@ -38,7 +38,7 @@ struct ExportOptions {
 /// Writes the samples of one level (or of a region) bit for bit, C order [z, y, x],
 /// little endian; as NRRD behind a header that keeps their place in world space, as raw with such
 /// a header beside it. `-` is standard output, for raw (without a header then), NRRD and zip.
-/// As zip: as write_zip(), whatever level and region are.
+/// As zip: as write_zip(); with a level, a region or an isovalue a UsageError.
 /// As OpenVDB: a sparse grid with the same samples and place; smaller integers
 /// become int32, u32 becomes int64. With an isovalue a level set (export_level_set.h).
 /// Memory: one row of bricks at a time, within the budget; for OpenVDB also the

@@ -268,6 +268,8 @@ void check_is_not_input(const StoreReader& store, const std::filesystem::path& o
 
 std::uint64_t export_zip(const StoreReader& store, const std::filesystem::path& out,
                          const ExportOptions& options, Progress& progress) {
+  if (options.level != 0 || options.roi || options.isovalue)
+    throw UsageError("a zip holds the whole store: no level, region or isosurface of it");
   check_is_not_input(store, out);
   return write_zip(*store.storage(), out, {.force = options.force, .cancel = options.cancel},
                    progress);
@@ -278,9 +280,9 @@ std::uint64_t export_zip(const StoreReader& store, const std::filesystem::path& 
 std::uint64_t export_volume(const StoreReader& store, const std::filesystem::path& out,
                             const ExportOptions& options, Progress& listener) {
   CancellableProgress progress(listener, options.cancel);
+  if (options.format == ExportFormat::zip) return export_zip(store, out, options, progress);
   if (options.isovalue && options.format != ExportFormat::vdb)
     throw UsageError("a level set can only be written as an OpenVDB file");
-  if (options.format == ExportFormat::zip) return export_zip(store, out, options, progress);
   const bool streamed = out == kStandardOutput;
   if (streamed && options.format == ExportFormat::vdb)
     throw UsageError(

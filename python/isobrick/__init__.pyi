@@ -254,7 +254,7 @@ class Volume:
         *,
         level: int = 0,
         roi: _Roi = None,
-        format: Optional[Literal["raw", "nrrd", "vdb"]] = None,
+        format: Optional[Literal["raw", "nrrd", "vdb", "zip"]] = None,
         isovalue: Union[str, float, None] = None,
         half_band: int = 3,
         inside: Optional[_Inside] = None,

@@ -247,13 +247,14 @@ class Volume:
     ):
         """Writes the samples of a level, bit for bit, or an OpenVDB level set of an isosurface.
 
-        `format` is "raw", "nrrd" or "vdb"; None: by the extension (.raw, .bin, .nrrd, .vdb).
+        `format` is "raw", "nrrd", "vdb" or "zip"; None: by the extension (.raw, .bin, .nrrd,
+        .vdb, .zip). A zip holds the whole store.
         `isovalue` is for .vdb: a level set with `half_band` voxels on either side.
         """
         path = path_text(path)
         format = format or _export_format(path)
-        if format not in ("raw", "nrrd", "vdb"):
-            raise UsageError(f"format must be 'raw', 'nrrd' or 'vdb', not {format!r}")
+        if format not in ("raw", "nrrd", "vdb", "zip"):
+            raise UsageError(f"format must be 'raw', 'nrrd', 'vdb' or 'zip', not {format!r}")
         if isovalue is not None:
             isovalue = self.isovalue(isovalue) if isinstance(isovalue, str) else isovalue
             isovalue = number(isovalue, "isovalue")
@@ -280,10 +281,10 @@ class Volume:
 
 
 def _export_format(path):
-    formats = {".raw": "raw", ".bin": "raw", ".nrrd": "nrrd", ".vdb": "vdb"}
+    formats = {".raw": "raw", ".bin": "raw", ".nrrd": "nrrd", ".vdb": "vdb", ".zip": "zip", ".ozx": "zip"}
     extension = os.path.splitext(path)[1].lower()
     if extension not in formats:
-        raise UsageError(f"{path!r} is no volume that can be written: name it .nrrd, .vdb or .raw")
+        raise UsageError(f"{path!r} is no volume that can be written: name it .nrrd, .vdb, .raw or .zip")
     return formats[extension]
 
 

@@ -67,6 +67,10 @@ def test_export(store, tmp_path):
     )
     isobrick.open(store).export(tmp_path / "a.nrrd", level=1)
     assert (tmp_path / "a.nrrd").stat().st_size > 30 * 25 * 20
+    isobrick.export(store, tmp_path / "a.zarr.zip")
+    assert np.array_equal(isobrick.open(tmp_path / "a.zarr.zip").read(), samples)
+    with pytest.raises(ValueError, match="whole store"):
+        isobrick.export(store, tmp_path / "b.zip", level=1)
     with pytest.raises(ValueError, match="written"):
         isobrick.export(store, tmp_path / "a.txt")
 
