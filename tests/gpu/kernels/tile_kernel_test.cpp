@@ -164,9 +164,11 @@ TEST(TileKernelOf, TilesThatSeveralBlocksSearch) {
   SurfaceOptions part;
   part.roi = {{0, 31, 100}, {2, 500, 760}};
   const Int3 extent{2, 1030, 1027};
-  const TileRun run{.blocks = 3};
-  compare(Field<std::uint8_t>(extent, value), run, {50});
-  compare(Field<std::uint8_t>(extent, value), run, {50}, part);
+  const Field<std::uint8_t> field(extent, value);
+  const Lattice lattice{extent, {64, 64, 64}, ScalarType::u8};
+  const DenseBricks bricks(lattice, field.samples.data());
+  for (const SurfaceOptions& options : {SurfaceOptions{}, part})
+    compare(KernelVolume<std::uint8_t>(field, bricks, lattice, options), {.blocks = 3}, {50});
 }
 #endif
 
