@@ -108,7 +108,8 @@ void write_zip(const Storage& storage, const std::function<bool(const std::strin
   find_keys(storage, "", keys);
   std::erase_if(keys, [&](const std::string& key) { return !wanted(key); });
   if (keys.empty()) throw Error(fmt::format("'{}' has nothing to put into a zip", storage.name()));
-  std::ranges::sort(keys, {}, place_of);
+  std::sort(keys.begin(), keys.end(),
+            [](const std::string& a, const std::string& b) { return place_of(a) < place_of(b); });
   std::uint64_t total = 0;
   for (const std::string& key : keys)
     if (const auto object = storage.open(key)) total += object->size();
