@@ -3,6 +3,8 @@
 //
 //   bench_topology --raw bonsai_256x256x256_uint8.raw --isovalue 45
 //   bench_topology --noise 128
+//
+// Built as in bench/README.md.
 
 #include <fmt/format.h>
 #include <tbb/task_arena.h>
