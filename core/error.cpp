@@ -4,9 +4,9 @@
 
 namespace isobrick::inline v0 {
 
-Error system_error(const std::string& what, const std::string& path, int errno_value) {
-  return Error("cannot " + what + " '" + path +
-               "': " + std::generic_category().message(errno_value));
+SystemError system_error(const std::string& what, const std::string& path, int errno_value) {
+  return {"cannot " + what + " '" + path + "': " + std::generic_category().message(errno_value),
+          errno_value};
 }
 
 }  // namespace isobrick

@@ -34,7 +34,20 @@ class ISOBRICK_API Cancelled : public Error {
   using Error::Error;
 };
 
+/// The operating system refuses a file, a folder or a device.
+class ISOBRICK_API SystemError : public Error {
+ public:
+  /// `code` is a value of errno.
+  SystemError(const std::string& message, int code) : Error(message), code_(code) {}
+  /// The value of errno.
+  int code() const { return code_; }
+
+ private:
+  int code_;
+};
+
 /// "cannot open 'path': Permission denied" for the given errno value.
-ISOBRICK_API Error system_error(const std::string& what, const std::string& path, int errno_value);
+ISOBRICK_API SystemError system_error(const std::string& what, const std::string& path,
+                                      int errno_value);
 
 }  // namespace isobrick
