@@ -1,6 +1,5 @@
 #include "tools/isovalues.h"
 
-#include <algorithm>
 #include <utility>
 
 #include <fmt/format.h>
@@ -31,17 +30,8 @@ Histogram histogram_of(const StoreReader& store, Console& console) {
 
 std::vector<double> resolve_isovalues(const std::vector<IsovalueRequest>& requests,
                                       const StoreReader& store, Console& console) {
-  Histogram samples;
-  if (std::any_of(requests.begin(), requests.end(), needs_histogram))
-    samples = histogram_of(store, console);
-  std::vector<double> isovalues;
-  for (const IsovalueRequest& request : requests) {
-    const double isovalue = resolve_isovalue(request, samples, store.info().type);
-    const bool is_there =
-        std::find(isovalues.begin(), isovalues.end(), isovalue) != isovalues.end();
-    if (!is_there) isovalues.push_back(isovalue);
-  }
-  return isovalues;
+  return isobrick::resolve_isovalues(requests, store.info().type,
+                                     [&] { return histogram_of(store, console); });
 }
 
 std::optional<SuggestedIsovalue> suggest_isovalue_of(const StoreReader& store, Console& console) {

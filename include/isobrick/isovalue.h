@@ -1,7 +1,9 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -48,6 +50,12 @@ ISOBRICK_API bool needs_histogram(const IsovalueRequest& request);
 ISOBRICK_API double resolve_isovalue(const IsovalueRequest& request, const Histogram& histogram,
                                      ScalarType type);
 
+/// The isovalues of several requests, each once. Calls `samples` for the histogram if one of them
+/// needs it.
+ISOBRICK_API std::vector<double> resolve_isovalues(std::span<const IsovalueRequest> requests,
+                                                   ScalarType type,
+                                                   const std::function<Histogram()>& samples);
+
 /// An isovalue for a volume of which nothing else is known.
 struct SuggestedIsovalue {
   double value = 0;  ///< the isovalue
@@ -57,6 +65,9 @@ struct SuggestedIsovalue {
 /// Suggests 0 for a level set, the border of the lowest label for labels, else Otsu's threshold.
 /// nullopt where all samples are equal or none is finite.
 ISOBRICK_API std::optional<SuggestedIsovalue> suggest_isovalue(const StoreInfo& info,
+                                                               const Histogram& histogram);
+/// The same for samples of a type that are no level set.
+ISOBRICK_API std::optional<SuggestedIsovalue> suggest_isovalue(ScalarType type,
                                                                const Histogram& histogram);
 
 }  // namespace isobrick

@@ -5,6 +5,7 @@
 
 #include <isobrick/api.h>
 #include <isobrick/extract.h>
+#include <isobrick/histogram.h>
 #include <isobrick/mesh.h>
 #include <isobrick/progress.h>
 #include <isobrick/range.h>
@@ -49,6 +50,11 @@ class ISOBRICK_API VolumeExtractor {
   /// The smallest and the largest sample, missing ones left out. nullopt before all samples were
   /// scanned (the first extraction without a region does), and where all are missing.
   std::optional<ValueRange<double>> range() const;
+
+  /// The histogram of all samples, in as many bins as a store keeps: what resolve_isovalue() and
+  /// suggest_isovalue() need. Missing samples count as NaN. Reads every sample once. Takes some 64
+  /// MiB at most. `threads`: 0 means all cores. Throws what `read` and the progress throw.
+  Histogram histogram(int threads = 0, Progress& progress = no_progress());
 
  private:
   struct Impl;

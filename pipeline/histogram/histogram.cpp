@@ -55,6 +55,8 @@ SampleCounts count_level(const StoreReader& store, int level, Progress& progress
   return counts->counts();
 }
 
+}  // namespace
+
 Histogram histogram_of(SampleCounts&& counts, ScalarType type) {
   const HistogramBins& bins = counts.bins;
   Histogram h;
@@ -71,8 +73,6 @@ Histogram histogram_of(SampleCounts&& counts, ScalarType type) {
                      std::numeric_limits<double>::lowest());
   return h;
 }
-
-}  // namespace
 
 std::string why_no_histogram(const StoreReader& store, std::uint64_t memory) {
   const int level = choose_level(store.info());

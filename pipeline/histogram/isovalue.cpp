@@ -177,10 +177,27 @@ double resolve_isovalue(const IsovalueRequest& request, const Histogram& histogr
   return request.number;
 }
 
+std::vector<double> resolve_isovalues(std::span<const IsovalueRequest> requests, ScalarType type,
+                                      const std::function<Histogram()>& samples) {
+  Histogram counted;
+  if (std::any_of(requests.begin(), requests.end(), needs_histogram)) counted = samples();
+  std::vector<double> isovalues;
+  for (const IsovalueRequest& request : requests) {
+    const double isovalue = resolve_isovalue(request, counted, type);
+    if (std::find(isovalues.begin(), isovalues.end(), isovalue) == isovalues.end())
+      isovalues.push_back(isovalue);
+  }
+  return isovalues;
+}
+
 std::optional<SuggestedIsovalue> suggest_isovalue(const StoreInfo& info,
                                                   const Histogram& histogram) {
   if (is_level_set(info)) return SuggestedIsovalue{0, "the surface of the level set"};
-  if (const auto labels = lowest_labels(histogram, info.type))
+  return suggest_isovalue(info.type, histogram);
+}
+
+std::optional<SuggestedIsovalue> suggest_isovalue(ScalarType type, const Histogram& histogram) {
+  if (const auto labels = lowest_labels(histogram, type))
     return SuggestedIsovalue{0.5 * ((*labels)[0] + (*labels)[1]),
                              fmt::format("between {} and the labels above it", (*labels)[0])};
   const auto threshold = otsu(histogram);

@@ -1,6 +1,8 @@
 #include <isobrick/volume_extractor.h>
 
 #include "core/cancellable_progress.h"
+#include "pipeline/histogram/histogram.h"
+#include "pipeline/volume/volume_histogram.h"
 #include "pipeline/volume/volume_pass.h"
 
 namespace isobrick::inline v0 {
@@ -39,6 +41,12 @@ std::optional<ValueRange<double>> VolumeExtractor::range() const {
   if (!impl_->samples.is_known(impl_->samples.all_tiles())) return std::nullopt;
   const ValueRange<double> all = impl_->samples.ranges->all();
   return all.empty() ? std::nullopt : std::optional(all);
+}
+
+Histogram VolumeExtractor::histogram(int threads, Progress& progress) {
+  Workers workers(threads);
+  return histogram_of(count_samples(impl_->samples, workers, progress),
+                      impl_->samples.lattice.type);
 }
 
 Mesh extract(const Volume& volume, const ExtractOptions& options, Progress& progress) {
