@@ -41,6 +41,7 @@ struct MeshChunk {
 };
 
 struct MeshFileOptions;
+class Progress;
 
 /// A mesh in memory. Reused, it allocates nothing. With a memory resource, which must outlive it,
 /// all arrays lie in the caller's memory.
@@ -71,6 +72,9 @@ struct ISOBRICK_API Mesh {
   void save(const std::filesystem::path& path) const;
   /// The same with options.
   void save(const std::filesystem::path& path, const MeshFileOptions& options) const;
+  /// The same with reports of progress. What `progress` throws ends it and leaves no file.
+  void save(const std::filesystem::path& path, const MeshFileOptions& options,
+            Progress& progress) const;
 };
 
 /// Of what a mesh consists.

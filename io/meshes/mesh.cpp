@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include <isobrick/mesh_file_sink.h>
+#include <isobrick/progress.h>
 
 namespace isobrick::inline v0 {
 namespace {
@@ -24,14 +25,64 @@ MeshHeader header_of_mesh(const Mesh& mesh) {
   return header;
 }
 
+/// Elements between two reports of progress.
+constexpr std::size_t kPart = std::size_t{1} << 20;
+
+/// Calls f(begin, count) for the parts of `size` elements of `bytes` each.
+template <class F>
+void for_each_part(std::size_t size, std::size_t bytes, Progress& progress, F&& f) {
+  for (std::size_t i = 0; i < size; i += kPart) {
+    const std::size_t count = std::min(kPart, size - i);
+    f(i, count);
+    progress.advance(count * bytes);
+  }
+}
+
+/// Vertices first, so that triangles may name any of them.
+void write_welded(const Mesh& mesh, MeshSink& sink, Progress& progress) {
+  for_each_part(
+      mesh.positions.size(), sizeof(Vec3f), progress, [&](std::size_t i, std::size_t count) {
+        MeshChunk chunk{.first_vertex = i, .positions = mesh.positions.span().subspan(i, count)};
+        if (!mesh.normals.empty()) chunk.normals = mesh.normals.span().subspan(i, count);
+        sink.write(chunk);
+      });
+  for_each_part(mesh.triangles.size(), sizeof(Triangle), progress,
+                [&](std::size_t i, std::size_t count) {
+                  sink.write({.first_vertex = mesh.positions.size(),
+                              .triangles = mesh.triangles.span().subspan(i, count)});
+                });
+}
+
+/// Each chunk has all vertices.
+void write_unwelded(const Mesh& mesh, MeshSink& sink, Progress& progress) {
+  for_each_part(mesh.triangles.size(), sizeof(Triangle), progress,
+                [&](std::size_t i, std::size_t count) {
+                  MeshChunk chunk = mesh.chunk();
+                  chunk.triangles = chunk.triangles.subspan(i, count);
+                  sink.write(chunk);
+                });
+}
+
 }  // namespace
 
 void Mesh::save(const std::filesystem::path& path) const { save(path, {}); }
 
 void Mesh::save(const std::filesystem::path& path, const MeshFileOptions& options) const {
+  save(path, options, no_progress());
+}
+
+void Mesh::save(const std::filesystem::path& path, const MeshFileOptions& options,
+                Progress& progress) const {
   const std::unique_ptr<MeshSink> sink = create_mesh_file(path, options);
+  const bool is_welded = sink->indexing() == Indexing::welded;
+  progress.begin("saving", triangles.size() * sizeof(Triangle) +
+                               (is_welded ? positions.size() * sizeof(Vec3f) : 0));
   sink->begin(header_of_mesh(*this));
-  sink->write(chunk());
+  if (is_welded)
+    write_welded(*this, *sink, progress);
+  else
+    write_unwelded(*this, *sink, progress);
+  progress.end();
   sink->finish();
 }
 
