@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 
 #include "tools/pictures.h"
-#include "viewer/app/view_settings.h"
+#include "viewer/render/surface_colour.h"
 
 namespace isobrick::tools {
 

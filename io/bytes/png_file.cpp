@@ -9,7 +9,8 @@
 
 namespace isobrick::inline v0 {
 
-void write_png(OutputFile& out, int width, int height, std::span<const std::uint8_t> rgb) {
+std::vector<std::byte> encode_png(const std::string& name, int width, int height,
+                                  std::span<const std::uint8_t> rgb) {
   png_image image{};
   image.version = PNG_IMAGE_VERSION;
   image.width = static_cast<png_uint_32>(width);
@@ -18,14 +19,19 @@ void write_png(OutputFile& out, int width, int height, std::span<const std::uint
   const std::size_t samples =
       3 * static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
   if (width <= 0 || height <= 0 || rgb.size() != samples)
-    throw Error(fmt::format("'{}': {} bytes are no picture of {}x{}", out.path(), rgb.size(), width,
-                            height));
-  // Into memory, so that writing errors are reported like those of any other file.
+    throw Error(
+        fmt::format("'{}': {} bytes are no picture of {}x{}", name, rgb.size(), width, height));
   std::vector<std::byte> bytes(PNG_IMAGE_PNG_SIZE_MAX(image));
   png_alloc_size_t size = bytes.size();
   if (!png_image_write_to_memory(&image, bytes.data(), &size, 0, rgb.data(), 0, nullptr))
-    throw Error(fmt::format("cannot make the picture '{}': {}", out.path(), image.message));
-  out.writer().append(std::span(bytes).first(size));
+    throw Error(fmt::format("cannot make the picture '{}': {}", name, image.message));
+  bytes.resize(size);
+  return bytes;
+}
+
+void write_png(OutputFile& out, int width, int height, std::span<const std::uint8_t> rgb) {
+  // From memory, so that writing errors are reported like those of any other file.
+  out.writer().append(encode_png(out.path(), width, height, rgb));
   out.publish();
 }
 

@@ -10,6 +10,7 @@
 #include "viewer/app/navigation.h"
 #include "viewer/render/camera.h"
 #include "viewer/render/renderer.h"
+#include "viewer/render/surface_colour.h"
 
 namespace isobrick::inline v0 {
 
@@ -65,9 +66,6 @@ struct ViewSettings {
 
 inline constexpr std::size_t kMaxSurfaces = 16;
 inline constexpr float kMinPixelError = 0.1f, kMaxPixelError = 1000;
-
-/// The default colour of a surface; colours of the first surfaces are distinct.
-Vec3f surface_colour(std::size_t number);
 
 // JSON for bookmarks. Reading throws Error for missing or invalid fields.
 nlohmann::ordered_json to_json(const ViewSettings& settings);
