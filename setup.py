@@ -34,7 +34,7 @@ class CMakeBuild(build_ext):
         package = Path(self.get_ext_fullpath(extension.name)).resolve().parent
         package.mkdir(parents=True, exist_ok=True)
         built = Path(build) / "python" / "isobrick"
-        for module in built.glob("_isobrick*.so"):
+        for module in (*built.glob("_isobrick*.so"), *built.glob("_render*.so")):
             shutil.copy2(module, package)
         # The libraries of formats, which are loaded when they are needed.
         (package / "modules").mkdir(exist_ok=True)
@@ -44,7 +44,7 @@ class CMakeBuild(build_ext):
     @staticmethod
     def configure(build):
         options = ["-DISOBRICK_PYTHON=ON", "-DISOBRICK_BUILD_TESTS=OFF", "-DISOBRICK_BUILD_TOOLS=OFF",
-                   "-DISOBRICK_VIEWER=OFF", "-DCMAKE_BUILD_TYPE=Release", "-DCMAKE_UNITY_BUILD=ON"]
+                   "-DCMAKE_BUILD_TYPE=Release", "-DCMAKE_UNITY_BUILD=ON"]
         generator = ["-G", "Ninja"] if shutil.which("ninja") else []
         subprocess.check_call(["cmake", "-S", str(ROOT), "-B", str(build), *generator, *options,
                                f"-DPython3_EXECUTABLE={sys.executable}",

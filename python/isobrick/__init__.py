@@ -8,6 +8,7 @@
 
     volume = isobrick.open("scan.nrrd")                            # a file of any format
     volume.extract("otsu", level=1, normals=True)
+    isobrick.render(volume, "otsu")                                # a picture in a notebook
 
 Axis order: arrays and all that indexes them (shape, roi, brick) are [z, y, x]. World space (spacing,
 origin, direction, vertices, normals) is x, y, z, as in VTK, SimpleITK and nibabel. Only
@@ -17,12 +18,13 @@ Long operations take `progress=`, leave the GIL to other threads, and end within
 """
 
 from ._device import DeviceMesh, DeviceRows
-from ._errors import DamageError, Error, UsageError
+from ._errors import DamageError, Error, FileError, UsageError
 from ._extract import Extractor, extract
 from ._isobrick import __version__
 from ._marching_cubes import marching_cubes
 from ._mesh import Mesh
 from ._operations import convert, export, index, info, synth, verify
+from ._picture import Picture, render
 from ._volume import Histogram, Level, Volume, open
 
 __all__ = [
@@ -31,9 +33,11 @@ __all__ = [
     "DeviceRows",
     "Error",
     "Extractor",
+    "FileError",
     "Histogram",
     "Level",
     "Mesh",
+    "Picture",
     "UsageError",
     "Volume",
     "__version__",
@@ -44,6 +48,7 @@ __all__ = [
     "info",
     "marching_cubes",
     "open",
+    "render",
     "synth",
     "verify",
 ]

@@ -1,7 +1,7 @@
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, Optional, Union
+from typing import Any, Literal, Optional, Union, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
@@ -17,10 +17,14 @@ _Topology = Literal["consistent", "trilinear"]
 _Backend = Literal["auto", "cpu", "cuda"]
 _Rotation = Union[Sequence[float], Sequence[Sequence[float]], NDArray[np.floating[Any]], None]
 _Numbers = Optional[Sequence[float]]
+_Isovalue = Union[str, float]
+_Isovalues = Union[Sequence[_Isovalue], NDArray[Any]]
+_Colour = Union[str, Sequence[float]]
 
 class Error(RuntimeError): ...
 class UsageError(Error, ValueError): ...
 class DamageError(Error, OSError): ...
+class FileError(Error, OSError): ...
 
 class Mesh:
     def __init__(
@@ -40,7 +44,14 @@ class Mesh:
     @property
     def unit(self) -> str: ...
     def __len__(self) -> int: ...
-    def save(self, path: _Path, *, force: bool = False, quantize: bool = False) -> None: ...
+    def save(
+        self,
+        path: _Path,
+        *,
+        force: bool = False,
+        quantize: bool = False,
+        progress: _Progress = None,
+    ) -> None: ...
     def to_trimesh(self) -> Any: ...
     def to_vtk(self) -> Any: ...
     def to_pyvista(self) -> Any: ...
@@ -93,9 +104,37 @@ class Extractor:
     def dtype(self) -> np.dtype[Any]: ...
     @property
     def range(self) -> Optional[tuple[float, float]]: ...
+    def isovalue(
+        self,
+        text: _Isovalue,
+        *,
+        memory: _Bytes = ...,
+        threads: int = 0,
+        progress: _Progress = None,
+    ) -> float: ...
+    def isovalues(
+        self,
+        text: _Isovalue,
+        *,
+        memory: _Bytes = ...,
+        threads: int = 0,
+        progress: _Progress = None,
+    ) -> list[float]: ...
+    def suggested_isovalue(
+        self, *, memory: _Bytes = ..., threads: int = 0, progress: _Progress = None
+    ) -> Optional[tuple[float, str]]: ...
+    def histogram(
+        self,
+        bins: int = 64,
+        *,
+        memory: _Bytes = ...,
+        threads: int = 0,
+        progress: _Progress = None,
+    ) -> Histogram: ...
+    @overload
     def extract(
         self,
-        isovalue: float,
+        isovalue: _Isovalue,
         *,
         roi: _Roi = None,
         normals: bool = False,
@@ -106,10 +145,23 @@ class Extractor:
         threads: int = 0,
         progress: _Progress = None,
     ) -> Union[Mesh, DeviceMesh]: ...
+    @overload
+    def extract(
+        self,
+        isovalue: _Isovalues,
+        *,
+        roi: _Roi = None,
+        normals: bool = False,
+        inside: _Inside = "above",
+        drop_degenerate: bool = False,
+        memory: _Bytes = ...,
+        threads: int = 0,
+        progress: _Progress = None,
+    ) -> list[Union[Mesh, DeviceMesh]]: ...
     def save(
         self,
         path: _Path,
-        isovalue: float,
+        isovalue: _Isovalue,
         *,
         roi: _Roi = None,
         normals: bool = False,
@@ -123,9 +175,10 @@ class Extractor:
         quantize: bool = False,
     ) -> dict[str, Any]: ...
 
+@overload
 def extract(
     array: Any,
-    isovalue: float,
+    isovalue: _Isovalue,
     *,
     spacing: _Numbers = None,
     origin: _Numbers = None,
@@ -143,6 +196,26 @@ def extract(
     threads: int = 0,
     progress: _Progress = None,
 ) -> Union[Mesh, DeviceMesh]: ...
+@overload
+def extract(
+    array: Any,
+    isovalue: _Isovalues,
+    *,
+    spacing: _Numbers = None,
+    origin: _Numbers = None,
+    direction: _Rotation = None,
+    unit: Optional[str] = None,
+    mask: Optional[ArrayLike] = None,
+    nodata: Optional[float] = None,
+    stream: Any = None,
+    roi: _Roi = None,
+    normals: bool = False,
+    inside: _Inside = "above",
+    drop_degenerate: bool = False,
+    memory: _Bytes = ...,
+    threads: int = 0,
+    progress: _Progress = None,
+) -> list[Union[Mesh, DeviceMesh]]: ...
 def marching_cubes(
     volume: np.ndarray[Any, Any],
     level: Optional[float] = None,
@@ -200,15 +273,16 @@ class Volume:
     def info(self) -> dict[str, Any]: ...
     @property
     def notes(self) -> list[str]: ...
-    def isovalue(self, text: Union[str, float], *, progress: _Progress = None) -> float: ...
-    def isovalues(self, text: Union[str, float], *, progress: _Progress = None) -> list[float]: ...
+    def isovalue(self, text: _Isovalue, *, progress: _Progress = None) -> float: ...
+    def isovalues(self, text: _Isovalue, *, progress: _Progress = None) -> list[float]: ...
     def suggested_isovalue(
         self, *, progress: _Progress = None
     ) -> Optional[tuple[float, str]]: ...
     def histogram(self, bins: int = 64, *, progress: _Progress = None) -> Histogram: ...
+    @overload
     def extract(
         self,
-        isovalue: Union[str, float],
+        isovalue: _Isovalue,
         *,
         level: int = 0,
         roi: _Roi = None,
@@ -223,10 +297,27 @@ class Volume:
         device: int = 0,
         progress: _Progress = None,
     ) -> Mesh: ...
+    @overload
+    def extract(
+        self,
+        isovalue: _Isovalues,
+        *,
+        level: int = 0,
+        roi: _Roi = None,
+        normals: bool = False,
+        inside: Optional[_Inside] = None,
+        drop_degenerate: bool = False,
+        backend: _Backend = "auto",
+        memory: _Bytes = ...,
+        threads: int = 0,
+        gpu_memory: _Bytes = 0,
+        device: int = 0,
+        progress: _Progress = None,
+    ) -> list[Mesh]: ...
     def save_mesh(
         self,
         path: _Path,
-        isovalue: Union[str, float],
+        isovalue: _Isovalue,
         *,
         level: int = 0,
         roi: _Roi = None,
@@ -244,7 +335,7 @@ class Volume:
         quantize: bool = False,
     ) -> dict[str, Any]: ...
     def estimate(
-        self, isovalue: Union[str, float], *, level: int = 0, roi: _Roi = None
+        self, isovalue: _Isovalue, *, level: int = 0, roi: _Roi = None
     ) -> dict[str, Any]: ...
     def read(self, level: int = 0, roi: _Roi = None, *, threads: int = 0) -> NDArray[Any]: ...
     def __getitem__(self, index: Any) -> Any: ...
@@ -255,7 +346,7 @@ class Volume:
         level: int = 0,
         roi: _Roi = None,
         format: Optional[Literal["raw", "nrrd", "vdb", "zip"]] = None,
-        isovalue: Union[str, float, None] = None,
+        isovalue: Optional[_Isovalue] = None,
         half_band: int = 3,
         inside: Optional[_Inside] = None,
         force: bool = False,
@@ -264,6 +355,40 @@ class Volume:
         progress: _Progress = None,
     ) -> None: ...
 
+class Picture:
+    array: NDArray[np.uint8]
+    renderer: str
+    def __init__(self, array: NDArray[np.uint8], renderer: str = "") -> None: ...
+    @property
+    def size(self) -> tuple[int, int]: ...
+    def __array__(self, dtype: Any = None, copy: Optional[bool] = None) -> NDArray[Any]: ...
+    def _repr_png_(self) -> bytes: ...
+    def save(self, path: _Path, *, force: bool = False) -> None: ...
+
+def render(
+    source: Any,
+    isovalue: Union[_Isovalue, _Isovalues, None] = None,
+    *,
+    size: tuple[int, int] = (1280, 960),
+    camera: Union[str, dict[str, Any]] = "azimuth=30,elevation=20",
+    colour: Union[_Colour, Sequence[_Colour], None] = None,
+    opacity: Union[float, Sequence[float], None] = None,
+    background: Union[_Colour, tuple[_Colour, _Colour], None] = None,
+    clip: Union[Sequence[float], Sequence[Sequence[float]], None] = None,
+    region: Optional[Sequence[Optional[tuple[Optional[float], Optional[float]]]]] = None,
+    edges: bool = False,
+    occlusion: bool = True,
+    box: bool = False,
+    axes: bool = False,
+    scale_bar: Union[bool, str] = False,
+    level: Optional[int] = None,
+    roi: _Roi = None,
+    inside: Optional[_Inside] = None,
+    memory: _Bytes = ...,
+    threads: int = 0,
+    progress: _Progress = None,
+    **samples: Any,
+) -> Picture: ...
 def open(
     source: Any,
     *,

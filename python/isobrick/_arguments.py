@@ -4,6 +4,8 @@ import math
 import operator
 import os
 
+import numpy as np
+
 from . import _isobrick
 from ._errors import UsageError
 
@@ -23,6 +25,8 @@ def number(value, name):
         result = float(value)
     except (TypeError, ValueError):
         raise TypeError(f"{name} must be a number, not {value!r}") from None
+    except OverflowError:
+        raise UsageError(f"{name} is larger than any float64") from None
     if math.isnan(result):
         raise UsageError(f"{name} is not a number (NaN)")
     return result
@@ -34,6 +38,8 @@ def numbers(values, count, name):
         result = tuple(float(value) for value in values)
     except (TypeError, ValueError):
         raise TypeError(f"{name} must be {count} numbers, not {values!r}") from None
+    except OverflowError:
+        raise UsageError(f"{name} must be finite, not {values!r}") from None
     if len(result) != count:
         raise UsageError(f"{name} must be {count} numbers, not {len(result)}")
     if not all(map(math.isfinite, result)):
@@ -41,15 +47,41 @@ def numbers(values, count, name):
     return result
 
 
-def integers(values, name):
-    """A tuple of three integers."""
+def integers_of(values, count, name, axes=""):
+    """A tuple of so many integers."""
     try:
         result = tuple(operator.index(value) for value in values)
     except TypeError:
-        raise TypeError(f"{name} must be three integers [z, y, x], not {values!r}") from None
-    if len(result) != 3:
-        raise UsageError(f"{name} must be three integers [z, y, x], not {len(result)}")
+        raise TypeError(f"{name} must be {count} integers{axes}, not {values!r}") from None
+    if len(result) != count:
+        raise UsageError(f"{name} must be {count} integers{axes}, not {len(result)}")
     return result
+
+
+def integers(values, name):
+    """A tuple of three integers."""
+    return integers_of(values, 3, name, " [z, y, x]")
+
+
+def histogram_bins(bins):
+    bins = integer(bins, "bins")
+    if not 1 <= bins <= 1 << 16:
+        raise UsageError(f"bins must be 1 to 65536, not {bins}")
+    return bins
+
+
+def one_isovalue(text, values):
+    """The only one of the isovalues of a text."""
+    if len(values) != 1:
+        raise UsageError(
+            f"{text!r} means {len(values)} isovalues; one is needed here: isovalues() gives a list"
+        )
+    return values[0]
+
+
+def is_list(isovalue):
+    """Whether it is several isovalues."""
+    return not isinstance(isovalue, (str, bytes)) and np.ndim(isovalue) == 1
 
 
 def byte_count(value, name="memory"):

@@ -1,11 +1,15 @@
 """Surfaces of arrays."""
 
-from ._arguments import box_of, extract_options, mesh_file_options, number, path_text
+from ._arguments import (
+    box_of, byte_count, extract_options, histogram_bins, is_list, mesh_file_options, number, one_isovalue,
+    path_text, thread_count,
+)
 from ._device import DeviceMesh, DeviceSamples, is_on_device
 from ._errors import UsageError
 from ._mesh import Mesh
 from ._progress import reporting
 from ._samples import Samples
+from ._volume import Histogram
 
 
 class Extractor:
@@ -55,11 +59,11 @@ class Extractor:
         if stream is not None:
             raise UsageError("stream is for arrays in the memory of a CUDA device")
         samples = Samples(
-            array, spacing=spacing, origin=origin, direction=direction, unit=unit, mask=mask
+            array, spacing=spacing, origin=origin, direction=direction, unit=unit, mask=mask,
+            nodata=nodata,
         )
-        nodata = None if nodata is None else number(nodata, "nodata")
         self._samples = samples
-        self._native = samples.extractor(nodata)
+        self._native = samples.extractor()
 
     @property
     def shape(self):
@@ -83,6 +87,39 @@ class Extractor:
     def _on_device(self):
         return isinstance(self._samples, DeviceSamples)
 
+    def isovalue(self, text, *, memory=2**30, threads=0, progress=None):
+        """The isovalue that a text means, as of `Volume.isovalue`: "otsu", "p99.5", "50%", ….
+
+        Where the samples matter, all are counted, once for all texts.
+        """
+        values = self.isovalues(text, memory=memory, threads=threads, progress=progress)
+        return one_isovalue(text, values)
+
+    def isovalues(self, text, *, memory=2**30, threads=0, progress=None):
+        """The isovalues of a list or steps such as "100:500:50" or "otsu,p90"."""
+        if not isinstance(text, str):
+            return [number(text, "isovalue")]
+        self._check_host("isovalues that depend on the samples")
+        self._samples.set_memory(byte_count(memory))
+        with reporting(progress) as report:
+            return self._native.isovalues(text, thread_count(threads), report)
+
+    def suggested_isovalue(self, *, memory=2**30, threads=0, progress=None):
+        """(isovalue, why it is suggested), or None where all samples are equal."""
+        self._check_host("a suggested isovalue")
+        self._samples.set_memory(byte_count(memory))
+        with reporting(progress) as report:
+            return self._native.suggested_isovalue(thread_count(threads), report)
+
+    def histogram(self, bins=64, *, memory=2**30, threads=0, progress=None):
+        """The `Histogram` of all samples in at most so many bins. Missing samples count as NaN."""
+        self._check_host("a histogram")
+        self._samples.set_memory(byte_count(memory))
+        with reporting(progress) as report:
+            return Histogram(
+                **self._native.histogram(histogram_bins(bins), thread_count(threads), report)
+            )
+
     def extract(
         self, isovalue, *, roi=None, normals=False, inside="above", drop_degenerate=False,
         topology="consistent", memory=2**30, threads=0, progress=None,
@@ -91,8 +128,9 @@ class Extractor:
 
         Parameters
         ----------
-        isovalue : float
-            In the values of the samples.
+        isovalue : float, str, or a list of them
+            In the values of the samples, or a text as of `isovalue()`, such as "otsu". A list
+            gives a list of meshes.
         roi : slices [z, y, x], optional
             Only these samples, such as `numpy.s_[0:10, :, 5:]`.
         normals : bool
@@ -114,13 +152,17 @@ class Extractor:
 
         Raises UsageError (a ValueError) for a request that makes no sense.
         """
-        options = self._options(
-            isovalue, roi, normals, inside, drop_degenerate, topology, memory, threads
-        )
-        if self._on_device:
-            return DeviceMesh(self._native.extract(options))
+        several = is_list(isovalue)
+        requests = [
+            self._surface(
+                one, roi=roi, normals=normals, inside=inside, drop_degenerate=drop_degenerate,
+                topology=topology, memory=memory, threads=threads, progress=progress,
+            )
+            for one in (isovalue if several else [isovalue])
+        ]
         with reporting(progress) as report:
-            return Mesh._of(self._native.extract(options, report))
+            meshes = [self._mesh(options, report) for options in requests]
+        return meshes if several else meshes[0]
 
     def save(
         self, path, isovalue, *, roi=None, normals=False, inside="above", drop_degenerate=False,
@@ -131,8 +173,9 @@ class Extractor:
         The arguments are those of `extract` and of `Mesh.save`. Returns the numbers of vertices
         and faces in a dictionary.
         """
-        options = self._options(
-            isovalue, roi, normals, inside, drop_degenerate, topology, memory, threads
+        options = self._surface(
+            isovalue, roi=roi, normals=normals, inside=inside, drop_degenerate=drop_degenerate,
+            topology=topology, memory=memory, threads=threads, progress=progress,
         )
         file = mesh_file_options(force=force, quantize=quantize, threads=threads, memory=memory)
         if self._on_device:
@@ -140,17 +183,23 @@ class Extractor:
         with reporting(progress) as report:
             return self._native.save(options, path_text(path), file, report)
 
-    def _options(
-        self, isovalue, roi, normals, inside, drop_degenerate, topology, memory, threads
+    def _mesh(self, options, report):
+        if self._on_device:
+            return DeviceMesh(self._native.extract(options))
+        return Mesh._of(self._native.extract(options, report))
+
+    def _check_host(self, what):
+        if self._on_device:
+            raise UsageError(f"{what}: copy the array in device memory to the host")
+
+    def _surface(
+        self, isovalue, *, roi=None, memory=2**30, threads=0, progress=None, **options
     ):
+        """The request of a surface, for the C++ layer."""
         if isinstance(isovalue, str):
-            raise UsageError(
-                f"the isovalue of an array must be a number, not {isovalue!r}; "
-                "isobrick.open takes texts such as 'otsu'"
-            )
+            isovalue = self.isovalue(isovalue, memory=memory, threads=threads, progress=progress)
         options = extract_options(
-            isovalue, box=box_of(roi, self.shape), normals=normals, inside=inside,
-            drop_degenerate=drop_degenerate, topology=topology, memory=memory, threads=threads,
+            isovalue, box=box_of(roi, self.shape), memory=memory, threads=threads, **options
         )
         if not self._on_device:
             options.memory_of_others = self._samples.set_memory(options.memory)
@@ -163,6 +212,8 @@ def extract(
     topology="consistent", memory=2**30, threads=0, progress=None,
 ):
     """The isosurface of an array [z, y, x] as a `Mesh`, or a `DeviceMesh` of one on a device.
+
+    A list of isovalues gives a list of meshes.
 
     Parameters
     ----------

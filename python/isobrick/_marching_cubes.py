@@ -1,9 +1,12 @@
 """scikit-image's function, made by Isobrick."""
 
+import math
+
 import numpy as np
 
 from . import _isobrick
 from ._arguments import extract_options
+from ._errors import UsageError
 from ._mesh import Mesh
 from ._samples import _SUPPORTED
 
@@ -24,7 +27,8 @@ def marching_cubes(
     level : float, optional
         The isovalue. None: half the way from the smallest to the largest sample.
     spacing : three floats
-        Distance between samples along the array's axes.
+        Distance between samples along the array's axes. A negative one mirrors the surface, as in
+        scikit-image; 0 and NaN are refused.
     gradient_direction : "descent" or "ascent"
         "descent": objects of interest are larger than what is around them.
     step_size : int
@@ -52,8 +56,7 @@ def marching_cubes(
         raise ValueError("method should be one of 'lewiner' or 'lorensen'.")
     if gradient_direction not in ("descent", "ascent"):
         raise ValueError(f"Incorrect input {gradient_direction} in `gradient_direction`.")
-    if len(spacing) != 3:
-        raise ValueError("`spacing` must consist of three floats.")
+    spacing = _checked_spacing(spacing)
     step_size = int(step_size)
     if step_size < 1:
         raise ValueError("step_size must be at least one.")
@@ -69,13 +72,25 @@ def marching_cubes(
     verts = mesh.vertices[:, ::-1]
     if step_size != 1:
         verts *= step_size
-    if not np.array_equal(spacing, (1, 1, 1)):
-        verts = verts * np.r_[tuple(spacing)]
+    if spacing != (1, 1, 1):
+        verts = verts * np.array(spacing)
     # Turning the axes around turns the triangles around.
     faces = mesh.faces.view(np.int32)
     if gradient_direction == "ascent":
         faces = faces[:, ::-1]
     return verts, faces, mesh.normals[:, ::-1], values
+
+
+def _checked_spacing(spacing):
+    try:
+        spacing = tuple(float(distance) for distance in spacing)
+    except (TypeError, ValueError, OverflowError):
+        spacing = ()
+    if len(spacing) != 3:
+        raise ValueError("`spacing` must consist of three floats.")
+    if not all(map(math.isfinite, spacing)) or 0 in spacing:
+        raise UsageError(f"`spacing` must be finite and not 0, not {spacing}")
+    return spacing
 
 
 def _checked(volume, mask):

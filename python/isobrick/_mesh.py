@@ -4,6 +4,7 @@ import numpy as np
 
 from . import _isobrick
 from ._arguments import mesh_file_options, path_text
+from ._progress import reporting
 
 
 class Mesh:
@@ -80,7 +81,7 @@ class Mesh:
             parts.append(f"in {self.unit}s")
         return f"<isobrick.Mesh: {', '.join(parts)}>"
 
-    def save(self, path, *, force=False, quantize=False):
+    def save(self, path, *, force=False, quantize=False, progress=None):
         """Writes a mesh file.
 
         Parameters
@@ -91,10 +92,15 @@ class Mesh:
             Replaces a file that exists; otherwise that is a UsageError.
         quantize : bool
             GLB only: 16 bits a coordinate.
+        progress : function or tqdm, optional
+            A function of (stage, done, total) in bytes, a tqdm bar, or the class `tqdm`.
 
-        The file has its name once it is whole.
+        The file has its name once it is whole. Raises a FileError, which is an OSError, where the
+        system refuses it.
         """
-        self._native.save(path_text(path), mesh_file_options(force=force, quantize=quantize))
+        options = mesh_file_options(force=force, quantize=quantize)
+        with reporting(progress) as report:
+            self._native.save(path_text(path), options, report)
 
     def to_trimesh(self):
         """A `trimesh.Trimesh` of the same vertices and faces."""

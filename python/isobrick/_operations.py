@@ -79,7 +79,9 @@ def convert(source, path, *, progress=None, **options):
     memory, threads, progress
         As of `isobrick.open`.
     shape, dtype, spacing, origin, unit, channel, time, …
-        Of files, as of `isobrick.open`. Of arrays `spacing`, `origin`, `direction` and `unit`.
+        Of files, as of `isobrick.open`. Of arrays `spacing`, `origin`, `direction`, `unit`, `mask`
+        and `nodata`, as of `Extractor`. Missing samples become NaN: the store of integers is then
+        one of float32, or of float64 for 32 bits.
 
     Returns a dictionary of what was done: bytes_in, bytes_out, levels, bricks, seconds, ….
     """

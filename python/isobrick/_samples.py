@@ -3,7 +3,7 @@
 import numpy as np
 
 from . import _isobrick
-from ._arguments import transform
+from ._arguments import number, transform
 from ._device import is_on_device
 from ._errors import UsageError
 from ._blocks import BlockReader
@@ -71,7 +71,10 @@ def _evenly_spaced(coordinate, name):
 class Samples:
     """An array [z, y, x] and its place in world space."""
 
-    def __init__(self, array, *, spacing=None, origin=None, direction=None, unit=None, mask=None):
+    def __init__(
+        self, array, *, spacing=None, origin=None, direction=None, unit=None, mask=None,
+        nodata=None,
+    ):
         if _is_xarray(array):
             array, spacing, origin, direction, unit = _of_xarray(
                 array, spacing, origin, direction, unit
@@ -91,6 +94,7 @@ class Samples:
             )
         self.array = array
         self.mask = _checked_mask(mask, self.shape)
+        self.nodata = None if nodata is None else number(nodata, "nodata")
         samples = np.dtype("uint8") if self.dtype == np.dtype("?") else self.dtype
         self.reader = None if self.in_memory else BlockReader(array, samples)
         self.transform = transform(spacing, origin, direction, unit or "")
@@ -99,12 +103,12 @@ class Samples:
     def in_memory(self):
         return isinstance(self.array, np.ndarray) and not _repeats(self.array)
 
-    def extractor(self, nodata):
+    def extractor(self):
         """The extractor of the C++ layer."""
         if self.in_memory:
-            return _isobrick.ArrayExtractor.of_array(self.array, self.transform, nodata, self.mask)
+            return _isobrick.ArrayExtractor.of_array(self.array, self.transform, self.nodata, self.mask)
         return _isobrick.ArrayExtractor.of_function(
-            self.reader, self.shape, self.reader.dtype.name, self.transform, nodata, self.mask
+            self.reader, self.shape, self.reader.dtype.name, self.transform, self.nodata, self.mask
         )
 
     def set_memory(self, memory):
@@ -114,10 +118,12 @@ class Samples:
     def convert(self, path, options, report):
         """Writes a store."""
         if self.in_memory:
-            return _isobrick.convert_array(self.array, self.transform, path, options, report)
+            return _isobrick.convert_array(
+                self.array, self.transform, self.nodata, self.mask, path, options, report
+            )
         return _isobrick.convert_function(
             self.reader, self.shape, self.reader.dtype.name, self.set_memory(options.memory),
-            self.transform, path, options, report,
+            self.transform, self.nodata, self.mask, path, options, report,
         )
 
 

@@ -8,8 +8,8 @@ import numpy as np
 
 from . import _isobrick
 from ._arguments import (
-    box_of, byte_count, extract_options, integer, integers, mesh_file_options, number, numbers,
-    path_text, slices_of, thread_count,
+    box_of, byte_count, extract_options, histogram_bins, integer, integers, is_list,
+    mesh_file_options, number, numbers, one_isovalue, path_text, slices_of, thread_count,
 )
 from ._errors import UsageError
 from ._indexing import read_indexed
@@ -139,10 +139,7 @@ class Volume:
         "300", "otsu" (Otsu's threshold), "p99.5" (a percentile), "50%" (of the range), "300HU" or
         a preset such as "ct-bone". Reads the histogram where that is needed.
         """
-        values = self.isovalues(text, progress=progress)
-        if len(values) != 1:
-            raise UsageError(f"{text!r} means {len(values)} isovalues; one is needed here")
-        return values[0]
+        return one_isovalue(text, self.isovalues(text, progress=progress))
 
     def isovalues(self, text, *, progress=None):
         """The isovalues of a list or steps such as "100:500:50" or "otsu,p90"."""
@@ -158,11 +155,8 @@ class Volume:
 
     def histogram(self, bins=64, *, progress=None):
         """The `Histogram` in at most so many bins: the stored one, else of a level that is small."""
-        bins = integer(bins, "bins")
-        if not 1 <= bins <= 1 << 16:
-            raise UsageError(f"bins must be 1 to 65536, not {bins}")
         with reporting(progress) as report:
-            return Histogram(**self._native.histogram(bins, report))
+            return Histogram(**self._native.histogram(histogram_bins(bins), report))
 
     def extract(
         self, isovalue, *, level=0, roi=None, normals=False, inside=None, drop_degenerate=False,
@@ -172,8 +166,9 @@ class Volume:
 
         Parameters
         ----------
-        isovalue : float or str
-            A number, or a text as of `isovalue()`, such as "otsu".
+        isovalue : float, str, or a list of them
+            A number, or a text as of `isovalue()`, such as "otsu". A list gives a list of meshes,
+            made in one pass over the volume where `memory` has room.
         level : int
             0: the finest.
         roi : slices [z, y, x], optional
@@ -196,13 +191,24 @@ class Volume:
         progress : function or tqdm, optional
             A function of (stage, done, total) in bytes, a tqdm bar, or the class `tqdm`.
         """
-        options = self._options(
-            isovalue, progress, level=level, roi=roi, normals=normals, inside=inside,
+        request = dict(
+            level=level, roi=roi, normals=normals, inside=inside,
             drop_degenerate=drop_degenerate, topology=topology, backend=backend, memory=memory,
-            threads=threads, gpu_memory=gpu_memory, device=device,
+            threads=threads, gpu_memory=gpu_memory, device=device, progress=progress,
         )
+        if is_list(isovalue):
+            return self._extract_several(isovalue, request)
+        options = self._surface(isovalue, **request)
         with reporting(progress) as report:
             return Mesh._of(self._native.extract(options, report))
+
+    def _extract_several(self, isovalues, request):
+        isovalues = [self.isovalue(one, progress=request["progress"]) for one in isovalues]
+        if not isovalues:
+            return []
+        options = self._surface(isovalues[0], **request)
+        with reporting(request["progress"]) as report:
+            return [Mesh._of(one) for one in self._native.extract_several(options, isovalues, report)]
 
     def save_mesh(
         self, path, isovalue, *, level=0, roi=None, normals=False, inside=None,
@@ -214,8 +220,8 @@ class Volume:
         The arguments are those of `extract` and of `Mesh.save`. Returns a dictionary of what was
         done: vertices, faces, bricks, bricks_read, bytes_read, backend, seconds.
         """
-        options = self._options(
-            isovalue, progress, level=level, roi=roi, normals=normals, inside=inside,
+        options = self._surface(
+            isovalue, progress=progress, level=level, roi=roi, normals=normals, inside=inside,
             drop_degenerate=drop_degenerate, topology=topology, backend=backend, memory=memory,
             threads=threads, gpu_memory=gpu_memory, device=device,
         )
@@ -225,7 +231,7 @@ class Volume:
 
     def estimate(self, isovalue, *, level=0, roi=None):
         """About how large a mesh will be: vertices, faces and their relative uncertainty."""
-        options = self._options(isovalue, None, level=level, roi=roi)
+        options = self._surface(isovalue, level=level, roi=roi)
         return self._native.estimate(options)
 
     def read(self, level=0, roi=None, *, threads=0):
@@ -273,7 +279,8 @@ class Volume:
             raise UsageError(f"there is no level {level}; the levels are 0 to {len(self._levels) - 1}")
         return self._levels[level]
 
-    def _options(self, isovalue, progress, *, level, roi, **options):
+    def _surface(self, isovalue, *, level=0, roi=None, progress=None, **options):
+        """The request of a surface, for the C++ layer."""
         box = box_of(roi, self._level(level).shape)
         if isinstance(isovalue, str):
             isovalue = self.isovalue(isovalue, progress=progress)

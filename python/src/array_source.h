@@ -9,7 +9,8 @@
 
 namespace isobrick::python {
 
-/// The samples of a volume in memory, or behind a function, as the input of a conversion.
+/// The samples of a volume in memory, or behind a function, as the input of a conversion. Missing
+/// ones are NaN.
 class ArraySource final : public VolumeSource {
  public:
   /// What the volume names must outlive it. `memory` are bytes that its function takes. Throws
@@ -19,10 +20,12 @@ class ArraySource final : public VolumeSource {
   const VolumeInfo& info() const override { return info_; }
   bool random_access() const override { return true; }
   bool parallel() const override { return samples_.array.has_value() || samples_.concurrent; }
-  std::size_t memory() const override { return memory_; }
+  std::size_t memory() const override;
   void read(Box3 box, std::byte* out) override;
 
  private:
+  void read_with_missing(Box3 box, std::byte* out);
+
   VolumeSamples samples_;
   VolumeInfo info_;
   std::size_t memory_;

@@ -14,6 +14,13 @@ void raise(const char* name, const std::exception& error) {
   PyErr_SetString(type.ptr(), error.what());
 }
 
+/// An exception of the class that Python has for a value of errno.
+void raise_system(const SystemError& error) {
+  const py::module_ errors = py::module_::import("isobrick._errors");
+  const py::object raised = errors.attr("system_error")(error.code(), error.what());
+  PyErr_SetObject(py::type::handle_of(raised).ptr(), raised.ptr());
+}
+
 }  // namespace
 
 void bind_errors() {
@@ -24,6 +31,8 @@ void bind_errors() {
       raise("UsageError", error);
     } catch (const DamageError& error) {
       raise("DamageError", error);
+    } catch (const SystemError& error) {
+      raise_system(error);
     } catch (const Error& error) {
       raise("Error", error);
     } catch (const std::filesystem::filesystem_error& error) {

@@ -10,9 +10,12 @@
 #include <isobrick/error.h>
 #include <isobrick/mesh_file_sink.h>
 #include "python/src/bindings.h"
+#include "python/src/cancellable_sink.h"
 #include "python/src/casters.h"
 #include "python/src/interruptible.h"
+#include "python/src/isovalues.h"
 #include "python/src/sample_array.h"
+#include "python/src/surface_bounds.h"
 
 namespace isobrick::python {
 namespace {
@@ -21,7 +24,10 @@ namespace {
 class ArrayExtractor {
  public:
   ArrayExtractor(const Volume& volume, py::object samples, py::object mask)
-      : samples_(std::move(samples)), mask_(std::move(mask)), extractor_(volume) {}
+      : samples_(std::move(samples)),
+        mask_(std::move(mask)),
+        type_(volume.type),
+        extractor_(volume) {}
 
   std::unique_ptr<Mesh> extract(ExtractOptions options, const py::object& callback) {
     auto mesh = std::make_unique<Mesh>();
@@ -31,6 +37,23 @@ class ArrayExtractor {
       extractor_.extract(options, *mesh, reporter.progress);
     });
     return mesh;
+  }
+
+  void extract_to(ExtractOptions options, MeshSink& sink, const py::object& callback) {
+    run_interruptibly(callback, [&](Reporter reporter) {
+      const std::lock_guard lock(mutex_);
+      options.cancel = reporter.cancel;
+      CancellableSink cancellable(sink, reporter.cancel);
+      extractor_.extract(options, cancellable, reporter.progress);
+    });
+  }
+
+  std::pair<Vec3d, Vec3d> bounds(ExtractOptions options) {
+    return interruptible(py::none(), [&](Reporter reporter) {
+      const std::lock_guard lock(mutex_);
+      options.cancel = reporter.cancel;
+      return surface_bounds([&](MeshSink& sink) { extractor_.extract(options, sink); });
+    });
   }
 
   py::dict save(ExtractOptions options, const std::string& path, const MeshFileOptions& file,
@@ -44,6 +67,28 @@ class ArrayExtractor {
     return py::dict(py::arg("vertices") = report.vertices, py::arg("faces") = report.triangles);
   }
 
+  std::vector<double> isovalues(const std::string& text, int threads, const py::object& callback) {
+    return interruptible(callback, [&](Reporter reporter) {
+      const std::lock_guard lock(mutex_);
+      return resolve_isovalues(parse_isovalues(text), type_,
+                               [&] { return counted(threads, reporter.progress); });
+    });
+  }
+
+  Suggestion suggested_isovalue(int threads, const py::object& callback) {
+    return pair_of(interruptible(callback, [&](Reporter reporter) {
+      const std::lock_guard lock(mutex_);
+      return suggest_isovalue(type_, counted(threads, reporter.progress));
+    }));
+  }
+
+  py::dict histogram(int bins, int threads, const py::object& callback) {
+    return describe(interruptible(callback, [&](Reporter reporter) {
+      const std::lock_guard lock(mutex_);
+      return rebin(counted(threads, reporter.progress), bins);
+    }));
+  }
+
   std::optional<std::pair<double, double>> range() {
     const py::gil_scoped_release release;
     const std::lock_guard lock(mutex_);
@@ -53,22 +98,17 @@ class ArrayExtractor {
   }
 
  private:
+  const Histogram& counted(int threads, Progress& progress) {
+    if (!histogram_) histogram_ = extractor_.histogram(threads, progress);
+    return *histogram_;
+  }
+
   py::object samples_, mask_;
+  ScalarType type_;   ///< of the samples
   std::mutex mutex_;  ///< one operation at a time
   VolumeExtractor extractor_;
+  std::optional<Histogram> histogram_;  ///< of all samples, once they were counted
 };
-
-void add_missing(Volume& volume, std::optional<double> nodata, const py::object& mask) {
-  volume.nodata = nodata;
-  if (mask.is_none()) return;
-  const auto array = py::cast<py::array>(mask);
-  if (array.itemsize() != 1) throw UsageError("a mask has one byte a sample");
-  const Volume flags = volume_of(array, ScalarType::u8);
-  if (!(flags.extent == volume.extent))
-    throw UsageError("the mask must have the shape of the array");
-  volume.mask = static_cast<const std::uint8_t*>(flags.samples);
-  volume.mask_strides = flags.strides;
-}
 
 std::unique_ptr<ArrayExtractor> of_array(const py::array& samples, const Transform& transform,
                                          std::optional<double> nodata, const py::object& mask) {
@@ -94,7 +134,12 @@ void bind_extractor(py::module_& module) {
       .def_static("of_array", &of_array)
       .def_static("of_function", &of_function)
       .def("extract", &ArrayExtractor::extract)
+      .def("extract_to", &ArrayExtractor::extract_to)
+      .def("surface_bounds", &ArrayExtractor::bounds)
       .def("save", &ArrayExtractor::save)
+      .def("isovalues", &ArrayExtractor::isovalues)
+      .def("suggested_isovalue", &ArrayExtractor::suggested_isovalue)
+      .def("histogram", &ArrayExtractor::histogram)
       .def_property_readonly("range", &ArrayExtractor::range);
 }
 

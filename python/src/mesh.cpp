@@ -3,14 +3,19 @@
 #include <pybind11/numpy.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
+#include <limits>
 #include <memory>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include <fmt/format.h>
 
 #include <isobrick/error.h>
 #include <isobrick/mesh_file_sink.h>
+#include "core/box_union.h"
 #include "python/src/bindings.h"
 #include "python/src/casters.h"
 #include "python/src/interruptible.h"
@@ -58,9 +63,79 @@ std::unique_ptr<Mesh> make_mesh(const py::array_t<float, py::array::c_style>& ve
   return mesh;
 }
 
+/// The finite vertices' smallest and largest coordinates; zeros where there is none.
+MeshBounds bounds_of(const Mesh& mesh) {
+  BoxUnion<MeshBounds> all;
+  for (const Vec3f& p : mesh.positions.span())
+    if (std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z))
+      all.include({{p.x, p.y, p.z}, {p.x, p.y, p.z}});
+  return all.box().value_or(MeshBounds{});
+}
+
+/// Copies triangles of a mesh into chunks that each stand alone.
+class ChunkCopier {
+ public:
+  explicit ChunkCopier(const Mesh& mesh) : mesh_(mesh), numbers_(mesh.positions.size(), kNone) {}
+
+  /// The triangles from `first` on, with the vertices that they name. Valid until the next call.
+  MeshChunk copy(std::size_t first, std::size_t count) {
+    for (const std::uint32_t vertex : vertices_) numbers_[vertex] = kNone;
+    vertices_.clear();
+    positions_.clear();
+    normals_.clear();
+    triangles_.clear();
+    for (Triangle triangle : mesh_.triangles.span().subspan(first, count)) {
+      for (std::uint32_t& vertex : triangle) vertex = number_of(vertex);
+      triangles_.push_back(triangle);
+    }
+    return {0, positions_, normals_, triangles_};
+  }
+
+ private:
+  static constexpr auto kNone = std::numeric_limits<std::uint32_t>::max();
+
+  std::uint32_t number_of(std::uint32_t vertex) {
+    if (numbers_[vertex] != kNone) return numbers_[vertex];
+    numbers_[vertex] = static_cast<std::uint32_t>(vertices_.size());
+    vertices_.push_back(vertex);
+    positions_.push_back(mesh_.positions[vertex]);
+    if (!mesh_.normals.empty()) normals_.push_back(mesh_.normals[vertex]);
+    return numbers_[vertex];
+  }
+
+  const Mesh& mesh_;
+  std::vector<std::uint32_t> numbers_;   ///< of each vertex in the chunk, or kNone
+  std::vector<std::uint32_t> vertices_;  ///< of the chunk, as the mesh numbers them
+  std::vector<Vec3f> positions_, normals_;
+  std::vector<Triangle> triangles_;
+};
+
+/// Writes a mesh into a sink that takes chunks which stand alone.
+void write_to(const Mesh& mesh, MeshSink& sink, const py::object& callback) {
+  constexpr std::size_t batch = std::size_t{1} << 16;
+  check_faces(mesh);
+  run_interruptibly(callback, [&](Reporter reporter) {
+    const MeshBounds bounds = bounds_of(mesh);
+    sink.begin({.has_normals = !mesh.normals.empty(),
+                .world_lo = bounds.lo,
+                .world_hi = bounds.hi,
+                .unit = mesh.unit});
+    reporter.progress.begin("draw", mesh.triangles.size() * sizeof(Triangle));
+    ChunkCopier copier(mesh);
+    for (std::size_t at = 0; at < mesh.triangles.size(); at += batch) {
+      const std::size_t count = std::min(batch, mesh.triangles.size() - at);
+      sink.write(copier.copy(at, count));
+      reporter.progress.advance(count * sizeof(Triangle));
+    }
+    reporter.progress.end();
+    sink.finish();
+  });
+}
+
 }  // namespace
 
 void bind_mesh(py::module_& module) {
+  py::class_<MeshSink>(module, "MeshSink");
   py::class_<Mesh>(module, "Mesh")
       .def(py::init(&make_mesh))
       .def_property_readonly(
@@ -74,9 +149,18 @@ void bind_mesh(py::module_& module) {
                                return rows_of<std::uint32_t>(self, self.cast<Mesh&>().triangles);
                              })
       .def_readwrite("unit", &Mesh::unit)
-      .def("save", [](const Mesh& mesh, const std::string& path, const MeshFileOptions& options) {
-        check_faces(mesh);
-        run_interruptibly(py::none(), [&](Reporter) { mesh.save(path, options); });
+      .def_property_readonly("bounds",
+                             [](const Mesh& mesh) {
+                               const MeshBounds bounds = bounds_of(mesh);
+                               return std::pair(bounds.lo, bounds.hi);
+                             })
+      .def("write_to", &write_to)
+      .def("save", [](const Mesh& mesh, const std::string& path, const MeshFileOptions& options,
+                      const py::object& callback) {
+        run_interruptibly(callback, [&](Reporter reporter) {
+          check_faces(mesh);
+          mesh.save(path, options, reporter.progress);
+        });
       });
 }
 

@@ -71,15 +71,21 @@ py::dict convert_volume(Volume volume, std::size_t memory, const Transform& tran
   }));
 }
 
-py::dict convert_array(const py::array& array, const Transform& transform, const std::string& out,
+py::dict convert_array(const py::array& array, const Transform& transform,
+                       std::optional<double> nodata, const py::object& mask, const std::string& out,
                        const ConvertOptions& options, const py::object& callback) {
-  return convert_volume(volume_of(array), 0, transform, out, options, callback);
+  Volume volume = volume_of(array);
+  add_missing(volume, nodata, mask);
+  return convert_volume(volume, 0, transform, out, options, callback);
 }
 
 py::dict convert_function(const py::object& read, Int3 extent, ScalarType type, std::size_t memory,
-                          const Transform& transform, const std::string& out,
+                          const Transform& transform, std::optional<double> nodata,
+                          const py::object& mask, const std::string& out,
                           const ConvertOptions& options, const py::object& callback) {
-  return convert_volume(volume_of(read, extent, type), memory, transform, out, options, callback);
+  Volume volume = volume_of(read, extent, type);
+  add_missing(volume, nodata, mask);
+  return convert_volume(volume, memory, transform, out, options, callback);
 }
 
 py::dict index_store(const std::string& path, const std::string& kind, Index leaf,

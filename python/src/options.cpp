@@ -24,6 +24,9 @@ void bind_transform(py::module_& module) {
       .def_readwrite("unit", &Transform::unit);
   module.def("unit_name", [](const std::string& unit) { return unit_name(unit); });
   module.def("unit_names", &unit_names);
+  module.def("unit_ratio", [](const std::string& unit, const std::string& other) {
+    return unit_ratio(unit, other).value_or(1);
+  });
 }
 
 void bind_extract_options(py::module_& module) {

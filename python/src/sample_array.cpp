@@ -96,4 +96,16 @@ Volume volume_of(const py::object& read, Int3 extent, ScalarType type) {
   return volume;
 }
 
+void add_missing(Volume& volume, std::optional<double> nodata, const py::object& mask) {
+  volume.nodata = nodata;
+  if (mask.is_none()) return;
+  const auto array = py::cast<py::array>(mask);
+  if (array.itemsize() != 1) throw UsageError("a mask has one byte a sample");
+  const Volume flags = volume_of(array, ScalarType::u8);
+  if (!(flags.extent == volume.extent))
+    throw UsageError("the mask must have the shape of the array");
+  volume.mask = static_cast<const std::uint8_t*>(flags.samples);
+  volume.mask_strides = flags.strides;
+}
+
 }  // namespace isobrick::python

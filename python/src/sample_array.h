@@ -27,4 +27,8 @@ Volume volume_of(const pybind11::array& array, ScalarType type);
 /// the function alive. What it raises ends the operation.
 Volume volume_of(const pybind11::object& read, Int3 extent, ScalarType type);
 
+/// Sets which samples are missing: those of the value `nodata`, and those where `mask`, an array of
+/// one byte a sample or None, is 0. The mask must outlive the volume.
+void add_missing(Volume& volume, std::optional<double> nodata, const pybind11::object& mask);
+
 }  // namespace isobrick::python

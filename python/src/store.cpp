@@ -14,14 +14,17 @@
 #include <isobrick/estimate.h>
 #include <isobrick/export.h>
 #include <isobrick/extract.h>
-#include <isobrick/isovalue.h>
 #include <isobrick/mesh_file_sink.h>
+#include <isobrick/mesh_sinks.h>
 #include "pipeline/slab_reader.h"
 #include "pipeline/workers.h"
 #include "python/src/bindings.h"
+#include "python/src/cancellable_sink.h"
 #include "python/src/casters.h"
 #include "python/src/descriptions.h"
 #include "python/src/interruptible.h"
+#include "python/src/isovalues.h"
+#include "python/src/surface_bounds.h"
 
 namespace isobrick::python {
 namespace {
@@ -50,6 +53,42 @@ std::unique_ptr<Mesh> extract_mesh(const OpenedVolume& volume, ExtractOptions op
   return interruptible(callback, [&](Reporter reporter) {
     options.cancel = reporter.cancel;
     return std::make_unique<Mesh>(extract(volume.store(), options, reporter.progress));
+  });
+}
+
+/// A mesh for each isovalue, made together.
+std::vector<std::unique_ptr<Mesh>> extract_meshes(const OpenedVolume& volume,
+                                                  ExtractOptions options,
+                                                  const std::vector<double>& isovalues,
+                                                  const py::object& callback) {
+  return interruptible(callback, [&](Reporter reporter) {
+    options.cancel = reporter.cancel;
+    std::vector<std::unique_ptr<Mesh>> meshes;
+    std::vector<std::unique_ptr<MemorySink>> sinks;
+    std::vector<SurfaceOutput> outputs;
+    for (const double isovalue : isovalues) {
+      meshes.push_back(std::make_unique<Mesh>());
+      sinks.push_back(std::make_unique<MemorySink>(*meshes.back()));
+      outputs.push_back({isovalue, options.normals, sinks.back().get()});
+    }
+    extract(volume.store(), options, outputs, reporter.progress);
+    return meshes;
+  });
+}
+
+void extract_to(const OpenedVolume& volume, ExtractOptions options, MeshSink& sink,
+                const py::object& callback) {
+  run_interruptibly(callback, [&](Reporter reporter) {
+    options.cancel = reporter.cancel;
+    CancellableSink cancellable(sink, reporter.cancel);
+    extract(volume.store(), options, cancellable, reporter.progress);
+  });
+}
+
+std::pair<Vec3d, Vec3d> bounds_of(const OpenedVolume& volume, ExtractOptions options) {
+  return interruptible(py::none(), [&](Reporter reporter) {
+    options.cancel = reporter.cancel;
+    return surface_bounds([&](MeshSink& sink) { extract(volume.store(), options, sink); });
   });
 }
 
@@ -117,40 +156,24 @@ Histogram histogram_of(const StoreReader& store, Progress& progress) {
 }
 
 py::dict read_histogram(const OpenedVolume& volume, int bins, const py::object& callback) {
-  const Histogram h = interruptible(callback, [&](Reporter reporter) {
+  return describe(interruptible(callback, [&](Reporter reporter) {
     return histogram(volume.store(), reporter.progress, bins);
-  });
-  return py::dict(py::arg("counts") = py::array_t<std::uint64_t>(
-                      static_cast<py::ssize_t>(h.counts.size()), h.counts.data()),
-                  py::arg("first") = h.first, py::arg("bin_width") = h.bin_width,
-                  py::arg("lo") = h.lo, py::arg("hi") = h.hi, py::arg("level") = h.level,
-                  py::arg("nan") = h.not_a_number, py::arg("infinite") = h.infinite);
+  }));
 }
 
 std::vector<double> isovalues_of(const OpenedVolume& volume, const std::string& text,
                                  const py::object& callback) {
   return interruptible(callback, [&](Reporter reporter) {
-    const std::vector<IsovalueRequest> requests = parse_isovalues(text);
-    Histogram samples;
-    if (std::any_of(requests.begin(), requests.end(), needs_histogram))
-      samples = histogram_of(volume.store(), reporter.progress);
-    std::vector<double> isovalues;
-    for (const IsovalueRequest& request : requests)
-      isovalues.push_back(resolve_isovalue(request, samples, volume.store().info().type));
-    return isovalues;
+    return resolve_isovalues(parse_isovalues(text), volume.store().info().type,
+                             [&] { return histogram_of(volume.store(), reporter.progress); });
   });
 }
 
-std::optional<std::pair<double, std::string>> suggestion(const OpenedVolume& volume,
-                                                         const py::object& callback) {
-  return interruptible(callback,
-                       [&](Reporter reporter) -> std::optional<std::pair<double, std::string>> {
-                         const StoreReader& store = volume.store();
-                         const auto suggested =
-                             suggest_isovalue(store.info(), histogram_of(store, reporter.progress));
-                         if (!suggested) return std::nullopt;
-                         return std::pair(suggested->value, suggested->why);
-                       });
+Suggestion suggestion(const OpenedVolume& volume, const py::object& callback) {
+  return pair_of(interruptible(callback, [&](Reporter reporter) {
+    const StoreReader& store = volume.store();
+    return suggest_isovalue(store.info(), histogram_of(store, reporter.progress));
+  }));
 }
 
 void export_samples(const OpenedVolume& volume, const std::string& path, const std::string& format,
@@ -184,6 +207,9 @@ void bind_store(py::module_& module) {
       .def_property_readonly("notes", &OpenedVolume::notes)
       .def_property_readonly("range", &range_of)
       .def("extract", &extract_mesh)
+      .def("extract_several", &extract_meshes)
+      .def("extract_to", &extract_to)
+      .def("surface_bounds", &bounds_of)
       .def("save_mesh", &save_mesh)
       .def("estimate", &estimate_mesh)
       .def("read", &read_samples)

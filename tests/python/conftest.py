@@ -45,6 +45,15 @@ def same(a, b):
     )
 
 
+def can_draw():
+    """Whether there is OpenGL for pictures."""
+    try:
+        isobrick.render(ball(), 0, size=(16, 16))
+    except isobrick.Error as error:
+        return "OpenGL" not in str(error)
+    return True
+
+
 @pytest.fixture
 def store(tmp_path):
     """A store of a gyroid of 60×50×40 samples [z, y, x]."""

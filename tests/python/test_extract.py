@@ -163,7 +163,7 @@ def test_arrays_that_are_no_volumes(array, what):
     "arguments, what",
     [
         ({"isovalue": np.nan}, "NaN"),
-        ({"isovalue": "otsu"}, "number"),
+        ({"isovalue": "otso"}, "no isovalue"),
         ({"isovalue": None}, "number"),
         ({"isovalue": 1, "mask": np.ones((2, 2, 2), bool)}, "shape"),
         ({"isovalue": 1, "mask": np.ones((40, 50, 60))}, "bool"),

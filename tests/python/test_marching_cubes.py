@@ -66,6 +66,13 @@ def test_spacing_is_in_the_order_of_the_axes(spacing):
     assert measure.mesh_surface_area(ours[0], ours[1]) == pytest.approx(wanted, rel=0.03)
 
 
+def test_spacing_that_mirrors_and_that_flattens(ellipsoid):
+    assert_alike(*both(ellipsoid, 0.0, spacing=(1, -1, 2)))
+    for spacing in ((0, 1, 1), (1, np.nan, 1), (1, 1, np.inf), (1, 1, "a"), 3):
+        with pytest.raises(ValueError, match="spacing"):
+            isobrick.marching_cubes(ellipsoid, 0.0, spacing=spacing)
+
+
 @pytest.mark.parametrize("direction", ["descent", "ascent"])
 def test_winding(ellipsoid, direction):
     for volume in (ellipsoid, -ellipsoid):

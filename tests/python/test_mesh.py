@@ -1,6 +1,10 @@
 """Meshes: arrays that keep them alive, files, and the objects of other libraries."""
 
+import errno
 import gc
+import signal
+import threading
+import time
 
 import numpy as np
 import pytest
@@ -65,12 +69,40 @@ def test_files_that_cannot_be(tmp_path):
     mesh = isobrick.extract(ball(), 1)
     with pytest.raises(ValueError, match="a.xyz"):
         mesh.save(tmp_path / "a.xyz")
-    with pytest.raises(isobrick.Error):
+    with pytest.raises(FileNotFoundError, match="none/a.ply") as error:
         mesh.save(tmp_path / "none" / "a.ply")
+    assert isinstance(error.value, isobrick.FileError) and error.value.errno == errno.ENOENT
+    assert "\n" not in str(error.value) and str(error.value).startswith("cannot")
+    (tmp_path / "file").write_text("")
+    with pytest.raises(NotADirectoryError):
+        mesh.save(tmp_path / "file" / "a.ply")
+    (tmp_path / "file").unlink()
     mesh.faces[5, 1] = len(mesh.vertices)
     with pytest.raises(ValueError, match="a face names vertex"):
         mesh.save(tmp_path / "a.stl")
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("extension", ["ply", "stl", "obj", "glb", "vtp"])
+def test_ctrl_c_ends_a_save_and_leaves_no_file(tmp_path, extension):
+    side = 600
+    z, y, x = np.ogrid[:side, :side, :100]
+    mesh = isobrick.extract(((x + y + z) % 3).astype(np.uint8), 0.5, normals=True)
+    assert len(mesh) > 10_000_000
+    threading.Timer(0.3, signal.raise_signal, [signal.SIGINT]).start()
+    begun = time.monotonic()
+    with pytest.raises(KeyboardInterrupt):
+        mesh.save(tmp_path / f"a.{extension}")
+        time.sleep(2)
+    assert time.monotonic() - begun < 1.5
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_progress_of_a_save(tmp_path):
+    mesh = isobrick.extract(ball(), 1)
+    calls = []
+    mesh.save(tmp_path / "a.ply", progress=lambda *call: calls.append(call))
+    assert calls and calls[-1][0] == "saving" and calls[-1][1] == calls[-1][2]
 
 
 def test_vtk():

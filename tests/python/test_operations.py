@@ -24,6 +24,62 @@ def test_arrays_become_stores(tmp_path):
     assert isobrick.open(tmp_path / "a.zarr").info["codec"] == "none"
 
 
+class Lazy:
+    """Samples that are read by blocks."""
+
+    def __init__(self, array):
+        self.array, self.shape, self.dtype = array, array.shape, array.dtype
+
+    def __getitem__(self, box):
+        return self.array[box]
+
+
+@pytest.mark.parametrize("dtype, stored", [("u1", "f4"), ("i2", "f4"), ("i4", "f8"), ("f4", "f4")])
+def test_missing_samples_of_arrays_are_nan_in_stores(tmp_path, dtype, stored):
+    field = (ball() * 3 + 60).astype(dtype)
+    mask = np.ones(field.shape, bool)
+    mask[:, 20:30, 30:] = False
+    field[5, 5, 5] = 77
+    expected = np.where(mask & (field != 77), field, np.nan).astype(stored)
+    for i, array in enumerate((field, np.asfortranarray(field), field[::-1][::-1], Lazy(field))):
+        path = tmp_path / f"{i}.zarr"
+        isobrick.convert(array, path, mask=mask, nodata=77, memory="64M", brick=16)
+        volume = isobrick.open(path)
+        assert volume.dtype == np.dtype(stored)
+        assert np.array_equal(volume.read(), expected, equal_nan=True)
+        mesh = isobrick.extract(array, 60, mask=mask, nodata=77)
+        assert len(mesh) and same(volume.extract(60), mesh)
+        assert same(isobrick.extract(expected, 60), mesh)
+    flags = isobrick.convert(field > 60, tmp_path / "flags.zarr", nodata=0)
+    assert flags["levels"] and isobrick.open(tmp_path / "flags.zarr").dtype == np.float32
+
+
+def test_masks_that_make_no_sense(tmp_path):
+    field = ball()
+    for mask, what in ((np.ones((2, 2, 2), bool), "shape"), (np.ones(field.shape), "bool")):
+        with pytest.raises((TypeError, ValueError), match=what):
+            isobrick.convert(field, tmp_path / "a.zarr", mask=mask)
+    with pytest.raises(TypeError, match="nodata"):
+        isobrick.convert(field, tmp_path / "a.zarr", nodata="none")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_surface_ends_at_a_mask_as_its_cells_do():
+    """A cell has triangles where all of its corners are there; scikit-image's mask asks for one."""
+    field = ball()
+    mask = np.random.default_rng(1).random(field.shape) > 0.02
+    cells = np.lib.stride_tricks.sliding_window_view(mask, (2, 2, 2)).all(axis=(3, 4, 5))
+    corner = np.zeros(field.shape, bool)
+    corner[1:, 1:, 1:] = cells
+    ours = isobrick.extract(field, 0.3, mask=mask)
+    verts, faces, _, _ = isobrick.marching_cubes(field, 0.3, mask=corner)
+    assert len(faces) == len(ours) and 0 < len(ours) < len(isobrick.extract(field, 0.3))
+    middles = np.sort(ours.vertices[ours.faces].mean(1).round(2).view("f4,f4,f4").ravel())
+    theirs = verts[faces][..., ::-1].mean(1).round(2)
+    theirs = np.sort(np.ascontiguousarray(theirs, np.float32).view("f4,f4,f4").ravel())
+    assert np.array_equal(middles, theirs)
+
+
 def test_files_become_stores(tmp_path):
     field = ball()
     field.tofile(tmp_path / "a.raw")
