@@ -4,19 +4,50 @@ import math
 import operator
 import os
 
-import numpy as np
-
 from . import _isobrick
 from ._errors import UsageError
 
 _UNITS = {"": 1, "k": 2**10, "m": 2**20, "g": 2**30, "t": 2**40}
 
 
-def integer(value, name):
+def one_line(value):
+    """A value for a message."""
+    text = " ".join(repr(value).split())
+    return text if len(text) <= 80 else text[:79] + "…"
+
+
+def integer(value, name, least=-(2**63), most=2**63 - 1):
     try:
-        return operator.index(value)
+        result = operator.index(value)
     except TypeError:
         raise TypeError(f"{name} must be an integer, not {type(value).__name__}") from None
+    if not least <= result <= most:
+        bound = f"at least {least}" if result < least else f"at most {most}"
+        raise UsageError(f"{name} must be {bound}, not {result}")
+    return result
+
+
+def text_or_none(value, name):
+    if not isinstance(value, (str, type(None))):
+        raise TypeError(f"{name} must be a text, not {value!r}")
+    return value
+
+
+def unit_text(unit):
+    """The name of a unit of length; "" for None and ""."""
+    if not text_or_none(unit, "unit"):
+        return ""
+    name = _isobrick.unit_name(unit)
+    if not name:
+        raise UsageError(f"{unit!r} is no unit of length; those are {_isobrick.unit_names()}")
+    return name
+
+
+def check_names(function, given, allowed):
+    """Refuses arguments that a function does not have."""
+    for name in given:
+        if name not in allowed:
+            raise TypeError(f"{function}() got an unexpected keyword argument {name!r}")
 
 
 def number(value, name):
@@ -24,7 +55,7 @@ def number(value, name):
     try:
         result = float(value)
     except (TypeError, ValueError):
-        raise TypeError(f"{name} must be a number, not {value!r}") from None
+        raise TypeError(f"{name} must be a number, not {one_line(value)}") from None
     except OverflowError:
         raise UsageError(f"{name} is larger than any float64") from None
     if math.isnan(result):
@@ -37,9 +68,9 @@ def numbers(values, count, name):
     try:
         result = tuple(float(value) for value in values)
     except (TypeError, ValueError):
-        raise TypeError(f"{name} must be {count} numbers, not {values!r}") from None
+        raise TypeError(f"{name} must be {count} numbers, not {one_line(values)}") from None
     except OverflowError:
-        raise UsageError(f"{name} must be finite, not {values!r}") from None
+        raise UsageError(f"{name} must be finite, not {one_line(values)}") from None
     if len(result) != count:
         raise UsageError(f"{name} must be {count} numbers, not {len(result)}")
     if not all(map(math.isfinite, result)):
@@ -50,9 +81,9 @@ def numbers(values, count, name):
 def integers_of(values, count, name, axes=""):
     """A tuple of so many integers."""
     try:
-        result = tuple(operator.index(value) for value in values)
+        result = tuple(integer(value, name) for value in values)
     except TypeError:
-        raise TypeError(f"{name} must be {count} integers{axes}, not {values!r}") from None
+        raise TypeError(f"{name} must be {count} integers{axes}, not {one_line(values)}") from None
     if len(result) != count:
         raise UsageError(f"{name} must be {count} integers{axes}, not {len(result)}")
     return result
@@ -81,7 +112,9 @@ def one_isovalue(text, values):
 
 def is_list(isovalue):
     """Whether it is several isovalues."""
-    return not isinstance(isovalue, (str, bytes)) and np.ndim(isovalue) == 1
+    if isinstance(isovalue, (list, tuple, range)):
+        return True
+    return getattr(isovalue, "ndim", 0) == 1
 
 
 def byte_count(value, name="memory"):
@@ -124,12 +157,7 @@ def transform(spacing=None, origin=None, direction=None, unit=""):
         rows = [value for row in direction for value in (row if hasattr(row, "__iter__") else [row])]
         result.direction = numbers(rows, 9, "direction")
         check_rotation(result.direction)
-    if unit:
-        if not isinstance(unit, str):
-            raise TypeError(f"unit must be a text such as 'mm', not {unit!r}")
-        result.unit = _isobrick.unit_name(unit)
-        if not result.unit:
-            raise UsageError(f"{unit!r} is no unit of length; those are {_isobrick.unit_names()}")
+    result.unit = unit_text(unit)
     return result
 
 
@@ -174,7 +202,7 @@ def extract_options(
     options = _isobrick.ExtractOptions()
     options.isovalue = number(isovalue, "isovalue")
     options.roi = box
-    options.level = integer(level, "level")
+    options.level = integer(level, "level", 0, 64)
     options.normals = bool(normals)
     if inside not in (None, "above", "below"):
         raise UsageError(f"inside must be 'above', 'below' or None, not {inside!r}")
@@ -189,7 +217,7 @@ def extract_options(
         raise UsageError(f"backend must be 'auto', 'cpu' or 'cuda', not {backend!r}")
     options.backend = getattr(_isobrick.Backend, backend)
     options.gpu_memory = byte_count(gpu_memory, "gpu_memory") if gpu_memory else 0
-    options.device = integer(device, "device")
+    options.device = integer(device, "device", 0, 2**31 - 1)
     return options
 
 

@@ -65,6 +65,9 @@ class Extractor:
         self._samples = samples
         self._native = samples.extractor()
 
+    def __reduce__(self):
+        raise TypeError("an Extractor cannot be pickled; pickle its array, and make another")
+
     @property
     def shape(self):
         """Samples along z, y, x."""

@@ -12,6 +12,8 @@ def read_indexed(index, shape, dtype, read):
     """
     parts = index if isinstance(index, tuple) else (index,)
     ellipses = [i for i, part in enumerate(parts) if part is Ellipsis]
+    if len(ellipses) > 1:
+        raise IndexError("an index has one ellipsis at most")
     if ellipses:
         at = ellipses[0]
         parts = parts[:at] + (slice(None),) * (4 - len(parts)) + parts[at + 1 :]
@@ -27,6 +29,8 @@ def read_indexed(index, shape, dtype, read):
             box.append(slice(lo, hi + 1))
             within.append(slice(None, None, part.step))
             continue
+        if isinstance(part, (bool, np.bool_)) or not hasattr(part, "__index__"):
+            raise TypeError(f"indices are integers and slices, not {part!r}")
         place = operator.index(part)
         if not -size <= place < size:
             raise IndexError(f"index {place} is outside of an axis of {size} samples")

@@ -3,7 +3,7 @@
 import numpy as np
 
 from . import _isobrick
-from ._arguments import mesh_file_options, path_text
+from ._arguments import mesh_file_options, path_text, unit_text
 from ._progress import reporting
 
 
@@ -39,7 +39,7 @@ class Mesh:
             np.ascontiguousarray(vertices, np.float32),
             np.ascontiguousarray(faces, np.uint32),
             None if normals is None else np.ascontiguousarray(normals, np.float32),
-            unit,
+            unit_text(unit),
         )
 
     @classmethod
@@ -47,6 +47,9 @@ class Mesh:
         mesh = cls.__new__(cls)
         mesh._native = native
         return mesh
+
+    def __reduce__(self):
+        return _rebuilt, (self.vertices, self.faces, self.normals, self.unit)
 
     @property
     def vertices(self):
@@ -148,6 +151,11 @@ class Mesh:
 
         data = {} if self.normals is None else {"normals": self.normals}
         return meshio.Mesh(self.vertices, [("triangle", self.faces)], point_data=data)
+
+
+def _rebuilt(vertices, faces, normals, unit):
+    """A mesh from a pickle."""
+    return Mesh(vertices, faces, normals, unit=unit)
 
 
 def _vtk_cells(faces, vertices):

@@ -3,10 +3,10 @@
 import numpy as np
 
 from . import _isobrick
-from ._arguments import byte_count, integer, integers, number, path_text, thread_count
+from ._arguments import byte_count, check_names, integer, integers, number, path_text, thread_count
 from ._errors import UsageError
 from ._progress import reporting
-from ._samples import Samples
+from ._samples import ARRAY_NAMES, Samples
 from ._volume import Volume, open, source_path, volume_request
 
 __all__ = ["convert", "export", "index", "info", "synth", "verify"]
@@ -17,10 +17,10 @@ def _convert_options(
     index=None, leaf=16, resume=False, force=False, memory=2**30, threads=0,
 ):
     options = _isobrick.ConvertOptions()
-    options.brick = None if brick is None else integer(brick, "brick")
-    options.shard = None if shard is None else integer(shard, "shard")
-    options.zstd_level = None if compression is None else integer(compression, "compression")
-    options.levels = None if levels is None else integer(levels, "levels")
+    options.brick = None if brick is None else integer(brick, "brick", -(2**31), 2**31 - 1)
+    options.shard = None if shard is None else integer(shard, "shard", -(2**31), 2**31 - 1)
+    options.zstd_level = None if compression is None else integer(compression, "compression", -(2**31), 2**31 - 1)
+    options.levels = None if levels is None else integer(levels, "levels", -(2**31), 2**31 - 1)
     if str(ome) not in ("0.4", "0.5"):
         raise UsageError(f"ome must be '0.4' or '0.5', not {ome!r}")
     options.ome_04 = str(ome) == "0.4"
@@ -32,7 +32,7 @@ def _convert_options(
         raise UsageError(
             f"index must be linear, interval, kdtree, quadtree or octree, not {index!r}"
         )
-    options.leaf = integer(leaf, "leaf")
+    options.leaf = integer(leaf, "leaf", 1, 16)
     options.resume = bool(resume)
     options.force = bool(force)
     options.memory = byte_count(memory)
@@ -87,8 +87,10 @@ def convert(source, path, *, progress=None, **options):
     """
     store, others = _split(options)
     if hasattr(source, "dtype") and hasattr(source, "shape"):
+        check_names("convert", others, ARRAY_NAMES)
         with reporting(progress) as report:
             return Samples(source, **others).convert(path_text(path), store, report)
+    check_names("convert", others, volume_request.__kwdefaults__)
     request = volume_request(memory=store.memory, threads=store.threads, **others)
     with reporting(progress) as report:
         return _isobrick.convert_file(source_path(source), path_text(path), request, store, report)
@@ -132,6 +134,7 @@ def info(source, **request):
     """
     if isinstance(source, Volume):
         return source.info
+    check_names("info", request, volume_request.__kwdefaults__)
     return _isobrick.describe(source_path(source), volume_request(**request))
 
 
@@ -176,7 +179,7 @@ def synth(
     if min(shape) < 1:
         raise UsageError(f"shape must be positive, not {shape}")
     arguments = (
-        str(kind), shape, np.dtype(dtype).name, integer(seed, "seed"),
+        str(kind), shape, np.dtype(dtype).name, integer(seed, "seed", 0, 2**64 - 1),
         None if frequency is None else number(frequency, "frequency"), number(noise, "noise"),
     )
     if path is None:
@@ -184,7 +187,6 @@ def synth(
             raise TypeError(f"{sorted(options)} concern a store; give its path")
         return _isobrick.synth_array(*arguments)
     store, others = _split(options)
-    if others:
-        raise TypeError(f"synth does not take {sorted(others)}")
+    check_names("synth", others, ())
     with reporting(progress) as report:
         return _isobrick.synth_store(path_text(path), *arguments, store, report)

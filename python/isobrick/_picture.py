@@ -5,13 +5,14 @@ import os
 import numpy as np
 
 from . import _isobrick
-from ._arguments import integers_of, number, numbers, path_text
+from ._arguments import check_names, integers_of, is_list, number, numbers, path_text
 from ._device import DeviceMesh
 from ._errors import Error, UsageError
 from ._extract import Extractor
 from ._mesh import Mesh
 from ._progress import reporting
-from ._volume import Volume, open
+from ._samples import ARRAY_NAMES
+from ._volume import Volume, open, volume_request
 
 _MESH_FILES = (".ply", ".stl", ".obj", ".glb", ".vtp", ".pvtp")
 _FAR = 1e30  # beyond every mesh, and no infinity that would make NaN
@@ -282,11 +283,13 @@ def _is_mesh_file(source):
 def _opened(source, samples, progress):
     """What has surfaces."""
     if isinstance(source, (str, os.PathLike)):
+        check_names("render", samples, volume_request.__kwdefaults__)
         return open(source, progress=progress, **samples)
     if isinstance(source, (Volume, Extractor)):
         if samples:
             raise TypeError(f"{sorted(samples)} concern arrays and files")
         return source
+    check_names("render", samples, ARRAY_NAMES)
     return Extractor(source, **samples)
 
 
@@ -298,7 +301,7 @@ def _isovalues(source, isovalue, progress):
         return [suggested[0]]
     if isinstance(isovalue, str):
         return source.isovalues(isovalue, progress=progress)
-    if np.ndim(isovalue) == 0:
+    if not is_list(isovalue):
         return [number(isovalue, "isovalue")]
     isovalues = [source.isovalue(one, progress=progress) for one in isovalue]
     if not isovalues:

@@ -13,6 +13,10 @@ _SUPPORTED = {np.dtype(name) for name in
               ("u1", "i1", "u2", "i2", "u4", "i4", "f4", "f8", "?")}
 
 
+# What is known of an array besides its samples.
+ARRAY_NAMES = ("spacing", "origin", "direction", "unit", "mask", "nodata")
+
+
 def check_dtype(dtype, what="array"):
     """The dtype in native byte order. Raises TypeError for one that is not supported."""
     dtype = np.dtype(dtype)
@@ -39,6 +43,8 @@ def _check_shape(shape):
 def _checked_mask(mask, shape):
     if mask is None:
         return None
+    if isinstance(mask, np.ma.MaskedArray):
+        raise TypeError("mask is a numpy.ma.MaskedArray; give an array of bool")
     mask = np.asarray(mask)
     if mask.dtype not in (np.dtype("?"), np.dtype("u1")):
         raise TypeError(f"mask must be of bool or uint8, not {mask.dtype}")
@@ -79,6 +85,11 @@ class Samples:
             array, spacing, origin, direction, unit = _of_xarray(
                 array, spacing, origin, direction, unit
             )
+        if _is_volume(array):
+            spacing = array.spacing if spacing is None else spacing
+            origin = array.origin if origin is None else origin
+            direction = array.direction if direction is None else direction
+            unit = array.unit if unit is None else unit
         if isinstance(array, np.ma.MaskedArray):
             raise TypeError(
                 "array is a numpy.ma.MaskedArray; give array.data and "
@@ -141,6 +152,11 @@ def _in_memory_or_lazy(array):
     if is_lazy and not hasattr(array, "__array_interface__"):
         return array
     return np.asarray(array)
+
+
+def _is_volume(array):
+    """Whether it is an opened `Volume`, which knows its place."""
+    return type(array).__module__ == __package__ and hasattr(array, "save_mesh")
 
 
 def _is_xarray(array):

@@ -8,13 +8,15 @@ import numpy as np
 
 from . import _isobrick
 from ._arguments import (
-    box_of, byte_count, extract_options, histogram_bins, integer, integers, is_list,
-    mesh_file_options, number, numbers, one_isovalue, path_text, slices_of, thread_count,
+    box_of, byte_count, check_names, extract_options, histogram_bins, integer, integers, is_list,
+    mesh_file_options, number, numbers, one_isovalue, path_text, slices_of, text_or_none,
+    thread_count, unit_text,
 )
 from ._errors import UsageError
 from ._indexing import read_indexed
 from ._mesh import Mesh
 from ._progress import reporting
+from ._samples import check_dtype
 
 
 @dataclass(frozen=True)
@@ -60,16 +62,21 @@ class Histogram:
 class Volume:
     """A volume that `isobrick.open` has opened. Reads from the disk what is needed, when it is.
 
-    Arrays and all that indexes them are in the order z, y, x; world space is x, y, z.
+    Arrays and all that indexes them are in the order z, y, x; world space is x, y, z. A pickle of it
+    has the path and is opened again.
     """
 
     def __init__(self, native):
         self._native = native
+        self._opened = None
         self._info = native.info
         self._levels = tuple(
             Level(**{**level, "direction": tuple(level["direction"])})
             for level in self._info["levels"]
         )
+
+    def __reduce__(self):
+        return _reopened, self._opened
 
     @property
     def path(self):
@@ -85,6 +92,11 @@ class Volume:
     def shape(self):
         """Samples of level 0 along z, y, x."""
         return self._info["shape"]
+
+    @property
+    def ndim(self):
+        """Three."""
+        return 3
 
     @property
     def dtype(self):
@@ -247,6 +259,15 @@ class Volume:
         """Samples of level 0 by slices and integers, as a new array. Reads what covers them."""
         return read_indexed(index, self.shape, self.dtype, lambda box: self.read(0, box))
 
+    def __len__(self):
+        """Samples along z."""
+        return self.shape[0]
+
+    def __array__(self, dtype=None, copy=None):
+        """All samples of level 0. Reads them each time."""
+        samples = self.read()
+        return samples if dtype is None else samples.astype(dtype, copy=False)
+
     def export(
         self, path, *, level=0, roi=None, format=None, isovalue=None, half_band=3, inside=None,
         force=False, memory=2**30, threads=0, progress=None,
@@ -270,7 +291,8 @@ class Volume:
         )
         with reporting(progress) as report:
             self._native.export(
-                path, format, part, isovalue, integer(half_band, "half_band"), bool(force), report
+                path, format, part, isovalue, integer(half_band, "half_band", 1, 1000),
+                bool(force), report
             )
 
     def _level(self, level):
@@ -323,6 +345,11 @@ def source_path(source):
     return path
 
 
+def _sample_type(dtype):
+    native = check_dtype(dtype, "the file")
+    return "uint8" if native == np.dtype("?") else native.name
+
+
 def volume_request(
     *, shape=None, dtype=None, big_endian=False, offset=None, spacing=None, origin=None, unit=None,
     channel=None, time=None, grid=None, stride=1, nodata=None, roi=None, memory=None, threads=0,
@@ -332,32 +359,40 @@ def volume_request(
     if shape is not None:
         request.extent = integers(shape, "shape")
     if dtype is not None:
-        request.type = np.dtype(dtype).newbyteorder("=").name
+        request.type = _sample_type(dtype)
         big_endian = big_endian or np.dtype(dtype).str.startswith(">")
     if big_endian:
         request.big_endian = True
     if offset is not None:
-        request.offset = integer(offset, "offset")
+        request.offset = integer(offset, "offset", 0)
     if spacing is not None:
         request.spacing = numbers(spacing, 3, "spacing")
     if origin is not None:
         request.origin = numbers(origin, 3, "origin")
-    request.unit = unit
+    request.unit = unit_text(unit) or None
     if channel is not None:
-        request.channel = integer(channel, "channel")
+        request.channel = integer(channel, "channel", 0)
     if time is not None:
-        request.time = integer(time, "time")
-    request.grid = grid
-    request.stride = (stride,) * 3 if not hasattr(stride, "__iter__") else integers(stride, "stride")
+        request.time = integer(time, "time", 0)
+    request.grid = text_or_none(grid, "grid")
+    stride = stride if hasattr(stride, "__iter__") else (stride,) * 3
+    request.stride = integers(stride, "stride")
     if nodata is not None:
         request.nodata = number(nodata, "nodata")
     if roi is not None:
         parts = slices_of(roi)
-        request.set_roi([part.start for part in parts], [part.stop for part in parts])
+        lo, hi = [part.start for part in parts], [part.stop for part in parts]
+        bounds = [[None if at is None else integer(at, "roi") for at in ends] for ends in (lo, hi)]
+        request.set_roi(*bounds)
     if memory is not None:
         request.memory = byte_count(memory)
     request.threads = thread_count(threads)
     return request
+
+
+def _reopened(path, arguments):
+    """A volume from a pickle."""
+    return open(path, **arguments)
 
 
 def open(
@@ -396,6 +431,7 @@ def open(
     Raises FileNotFoundError, DamageError for broken files, UsageError where something must be
     chosen, Error otherwise.
     """
+    check_names("open", request, set(volume_request.__kwdefaults__) - {"memory", "threads"})
     path = source_path(source)
     if cache is True:
         folder = _isobrick.default_cache_folder()
@@ -407,4 +443,8 @@ def open(
             path, native_request, folder, byte_count(cache_limit, "cache_limit"),
             byte_count(memory), thread_count(threads), report,
         )
-    return Volume(native)
+    volume = Volume(native)
+    volume._opened = os.path.abspath(path), dict(
+        request, cache=cache, cache_limit=cache_limit, memory=memory, threads=threads
+    )
+    return volume

@@ -9,16 +9,11 @@ namespace {
 
 namespace py = pybind11;
 
-void raise(const char* name, const std::exception& error) {
-  const py::object type = py::module_::import("isobrick._errors").attr(name);
-  PyErr_SetString(type.ptr(), error.what());
-}
-
-/// An exception of the class that Python has for a value of errno.
-void raise_system(const SystemError& error) {
-  const py::module_ errors = py::module_::import("isobrick._errors");
-  const py::object raised = errors.attr("system_error")(error.code(), error.what());
-  PyErr_SetObject(py::type::handle_of(raised).ptr(), raised.ptr());
+/// Raises what a function of the package makes of its arguments.
+template <class... Args>
+void raise(const char* function, const Args&... args) {
+  const py::object error = py::module_::import("isobrick._errors").attr(function)(args...);
+  PyErr_SetObject(py::type::handle_of(error).ptr(), error.ptr());
 }
 
 }  // namespace
@@ -28,13 +23,13 @@ void bind_errors() {
     try {
       if (failure) std::rethrow_exception(failure);
     } catch (const UsageError& error) {
-      raise("UsageError", error);
+      raise("error_of", "UsageError", error.what());
     } catch (const DamageError& error) {
-      raise("DamageError", error);
+      raise("error_of", "DamageError", error.what());
     } catch (const SystemError& error) {
-      raise_system(error);
+      raise("system_error", error.code(), error.what());
     } catch (const Error& error) {
-      raise("Error", error);
+      raise("error_of", "Error", error.what());
     } catch (const std::filesystem::filesystem_error& error) {
       PyErr_SetString(PyExc_OSError, error.what());
     }

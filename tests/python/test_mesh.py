@@ -1,7 +1,9 @@
 """Meshes: arrays that keep them alive, files, and the objects of other libraries."""
 
+import copy
 import errno
 import gc
+import pickle
 import signal
 import threading
 import time
@@ -138,6 +140,28 @@ def test_other_libraries(module):
     other = getattr(mesh, f"to_{module}")()
     points = {"trimesh": "vertices", "meshio": "points", "pyvista": "points"}[module]
     assert np.allclose(getattr(other, points), mesh.vertices)
+
+
+def test_pickles_of_meshes_and_errors(tmp_path):
+    for normals in (True, False):
+        mesh = isobrick.extract(ball(), 1, normals=normals, unit="mm")
+        for other in (pickle.loads(pickle.dumps(mesh)), copy.deepcopy(mesh)):
+            assert same(other, mesh) and other.unit == "millimeter"
+            assert other.vertices.ctypes.data != mesh.vertices.ctypes.data
+    with pytest.raises(isobrick.FileError) as error:
+        mesh.save(tmp_path / "none" / "a.ply")
+    other = pickle.loads(pickle.dumps(error.value))
+    assert type(other) is type(error.value) and other.errno == errno.ENOENT
+    assert str(other) == str(error.value)
+
+
+def test_units_of_meshes():
+    corners, faces = [[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]
+    assert isobrick.Mesh(corners, faces, unit="mm").unit == "millimeter"
+    assert isobrick.Mesh(corners, faces).unit == ""
+    for unit in ("hours", 3):
+        with pytest.raises((TypeError, ValueError), match="unit"):
+            isobrick.Mesh(corners, faces, unit=unit)
 
 
 def test_copies_of_a_mesh_are_the_same():

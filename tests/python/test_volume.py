@@ -1,6 +1,7 @@
 """Volumes in stores and files."""
 
 import gc
+import pickle
 import zipfile
 
 import numpy as np
@@ -52,6 +53,76 @@ def test_samples_are_read_as_arrays(store, samples):
     assert volume[5:5].shape == samples[5:5].shape
     with pytest.raises(ValueError, match="no level 9"):
         volume.read(9)
+
+
+def test_a_volume_is_an_array_for_numpy(store, samples):
+    volume = isobrick.open(store)
+    assert volume.ndim == 3 and len(volume) == 60
+    assert np.array_equal(np.asarray(volume), samples)
+    assert np.asarray(volume, np.float32).dtype == np.float32
+    for index in (None, [1, 2], True, "a", 1.5):
+        with pytest.raises(TypeError, match="indices"):
+            volume[index]
+    with pytest.raises(IndexError, match="ellipsis"):
+        volume[..., ...]
+
+
+def test_an_opened_volume_keeps_its_place_as_an_array(tmp_path, samples):
+    place = dict(spacing=(1, 2, 3), origin=(4, 5, 6), unit="mm")
+    isobrick.convert(samples, tmp_path / "a.zarr", **place)
+    volume = isobrick.open(tmp_path / "a.zarr")
+    assert same(isobrick.extract(volume, 127.5), volume.extract(127.5))
+    assert isobrick.extract(volume, 127.5).unit == "millimeter"
+    isobrick.convert(volume, tmp_path / "b.zarr")
+    copied = isobrick.open(tmp_path / "b.zarr")
+    assert copied.spacing == (1, 2, 3) and copied.origin == (4, 5, 6)
+    assert copied.unit == "millimeter" and np.array_equal(copied.read(), samples)
+
+
+def test_pickles_are_opened_again(image):
+    path, samples = image
+    volume = isobrick.open(path, time=2, channel=1)
+    other = pickle.loads(pickle.dumps(volume))
+    assert other.path == volume.path and np.array_equal(other.read(), samples[2, 1])
+    with pytest.raises(TypeError, match="pickle"):
+        pickle.dumps(isobrick.Extractor(samples[0, 0]))
+
+
+@pytest.mark.parametrize(
+    "arguments, what",
+    [
+        ({"shape": (2**70, 1, 1)}, "shape must be at most"),
+        ({"dtype": "c8"}, "complex64"),
+        ({"dtype": "i8"}, "int64"),
+        ({"offset": -1}, "offset must be at least 0"),
+        ({"channel": 2**70}, "channel must be"),
+        ({"time": -1}, "time must be"),
+        ({"grid": 3}, "grid must be a text"),
+        ({"stride": 2**70}, "stride must be"),
+        ({"stride": 0}, "stride"),
+        ({"roi": np.s_[2**70 :]}, "roi must be"),
+        ({"roi": np.s_[0.5:]}, "roi must be an integer"),
+        ({"unit": "hours"}, "unit of length"),
+        ({"unit": 3}, "unit must be a text"),
+        ({"spacing": (10**400, 1, 1)}, "finite"),
+        ({"colour": 3}, "open\\(\\) got an unexpected"),
+    ],
+)
+def test_files_described_in_ways_that_make_no_sense(tmp_path, arguments, what):
+    np.zeros((4, 5, 6), np.float32).tofile(tmp_path / "a.raw")
+    request = {"shape": (4, 5, 6), "dtype": "f4", **arguments}
+    with pytest.raises((TypeError, ValueError), match=what) as error:
+        isobrick.open(tmp_path / "a.raw", cache=False, **request)
+    assert "\n" not in str(error.value)
+
+
+def test_numbers_that_no_machine_has(store):
+    volume = isobrick.open(store)
+    for arguments in ({"device": -1}, {"device": 2**40}, {"level": 2**70}, {"threads": 2**70}):
+        with pytest.raises(ValueError):
+            volume.extract(127.5, **arguments)
+    with pytest.raises(ValueError):
+        volume.histogram(2**70)
 
 
 def test_isovalues_as_texts(store, samples):
