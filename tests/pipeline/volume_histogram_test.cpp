@@ -15,6 +15,7 @@
 namespace isobrick::inline v0 {
 namespace {
 
+using test::naive_counts;
 using testing::Field;
 
 template <class T>
