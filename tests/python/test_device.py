@@ -164,14 +164,22 @@ def test_what_makes_no_sense_is_refused():
     refused(ValueError, "not supported", Described(field, typestr="<c8"))
     refused(ValueError, "mask", Described(field, mask=np.ones(field.shape, bool)))
     refused(ValueError, "nodata", Described(field), nodata=3)
-    refused(ValueError, "none, or more", Described(field, shape=(0, 4, 4)))
-    refused(ValueError, "no samples", Described(field, data=(0, False)))
-    refused(ValueError, "multiple", Described(field, strides=(7201, 180, 4)))
-    refused(ValueError, "stride", Described(field, strides=(7200, 0, 4)))
     refused(TypeError, "stream", Described(field), stream="first")
     refused(ValueError, "stream", field, stream=1)
     with pytest.raises(TypeError, match="copy it to the host"):
         isobrick.convert(Described(field), "unused.zarr")
+
+
+def test_memory_that_makes_no_sense_is_refused():
+    field = ball()
+    with pytest.raises(isobrick.Error, match="CUDA") as error:
+        isobrick.extract(Described(field), 1)
+    if "built without" in str(error.value):
+        pytest.skip("built without CUDA")
+    refused(ValueError, "none, or more", Described(field, shape=(0, 4, 4)))
+    refused(ValueError, "no samples", Described(field, data=(0, False)))
+    refused(ValueError, "multiple", Described(field, strides=(7201, 180, 4)))
+    refused(ValueError, "stride", Described(field, strides=(7200, 0, 4)))
 
 
 def test_host_memory_is_no_device_memory():
