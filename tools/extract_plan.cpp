@@ -200,6 +200,8 @@ std::uint64_t min_with_picture(const ExtractedSurface& surface, std::size_t surf
 }  // namespace
 
 void check_arguments(const ExtractArguments& arguments) {
+  for (const std::string& output : {arguments.output, arguments.preview.path})
+    refuse_url_output(output);
   form_of(arguments);
   if (is_standard_output(arguments.output) && is_standard_output(arguments.preview.path))
     throw UsageError("standard output takes a mesh or a picture; name a file for one of them");
