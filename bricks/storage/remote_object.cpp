@@ -111,6 +111,8 @@ void RangeFetcher::keep(const std::shared_ptr<const RemoteObject>& object,
 /// sent.
 std::vector<RangeFetcher::FetchPtr> RangeFetcher::take_pending() {
   is_scheduled_ = false;
+  // Several at a time, so that more of them can be joined.
+  if (!make_room(max_bytes_ / 4)) return {};
   std::vector<FetchPtr> taken;
   std::uint64_t bytes = 0;
   for (; !pending_.empty(); pending_.pop_front()) {
@@ -182,7 +184,7 @@ std::size_t RangeFetcher::read_kept(const RemoteObject& object, std::uint64_t of
                                     std::span<std::byte> out) {
   std::unique_lock lock(mutex_);
   const FetchPtr fetch = find(&object, offset);
-  // Whoever waits for room is overtaken by who needs the bytes now.
+  // A hint still waits for room, but the bytes are needed now.
   if (fetch && fetch->state == State::pending) {
     remove(fetch);
     return 0;

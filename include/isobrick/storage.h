@@ -96,7 +96,7 @@ ISOBRICK_API std::shared_ptr<const Storage> function_storage(StorageFunctions fu
 /// How objects behind a URL are read.
 struct RemoteOptions {
   std::uint64_t memory = std::uint64_t{64} << 20;  ///< bytes that are fetched ahead at most
-  int max_requests = 32;                           ///< under way at the same time
+  int max_requests = 64;                           ///< under way at the same time
   /// Of each request: failures of the network and the statuses 408, 429, 500, 502, 503 and 504 are
   /// tried again, after pauses that double, or the one that the server asks for.
   int tries = 7;

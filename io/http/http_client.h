@@ -48,7 +48,7 @@ struct S3Credentials {
 
 /// How requests are sent.
 struct HttpOptions {
-  int max_requests = 32;            ///< under way at the same time
+  int max_requests = 64;            ///< under way at the same time
   int tries = 7;                    ///< of each request, where it fails for a while
   double timeout_seconds = 30;      ///< without a connection or a byte
   std::stop_token cancel = {};      ///< ends requests with Cancelled
