@@ -48,6 +48,7 @@ const std::map<std::string, Names> kPublicHeaders = {
     {"io/volumes/open", {"open_source"}},
     {"io/volumes/synth", {"synth_source"}},
     {"io/meshes", {"mesh_file_sink"}},
+    {"filters", {"mesh_filters"}},
     {"bricks", {"store_reader"}},
     {"bricks/ranges", {"range_table"}},
     {"bricks/storage", {"storage"}},
