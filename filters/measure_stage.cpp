@@ -16,6 +16,11 @@ MeasureStage::MeasureStage(MeshSink& next, std::stop_token cancel, const Scratch
       sets_(place, memory / 4),
       sides_(place, memory / 4) {}
 
+void MeasureStage::begin(const MeshHeader& header) {
+  measure_.unit = header.unit;
+  next().begin(header);
+}
+
 void MeasureStage::include(Vec3d p) {
   if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z)) return;
   if (!measure_.bounds) measure_.bounds = MeshBounds{p, p};

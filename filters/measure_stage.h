@@ -31,7 +31,7 @@ class MeasureStage final : public FilterStage {
   MeasureStage(MeshSink& next, std::stop_token cancel, const ScratchPlace& place,
                std::uint64_t memory);
 
-  void begin(const MeshHeader& header) override { next().begin(header); }
+  void begin(const MeshHeader& header) override;
   void write(const MeshChunk& chunk) override;
   void finish() override;
 

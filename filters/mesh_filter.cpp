@@ -158,6 +158,7 @@ MeshMeasure measure(const Mesh& mesh) {
   check_numbers(mesh);
   NoSink nowhere;
   MeasureStage stage(nowhere, {}, {}, kAllMemory);
+  stage.begin({.unit = mesh.unit});
   stage.write(mesh.chunk());
   stage.finish();
   return stage.measure();

@@ -11,8 +11,8 @@ namespace isobrick::inline v0 {
 UnweldStage::UnweldStage(MeshSink& next, std::stop_token cancel, const ScratchPlace& place,
                          std::uint64_t memory)
     : FilterStage(next, std::move(cancel)),
-      positions_(place, memory / 2),
-      normals_(place, memory / 2),
+      positions_(place, (memory - std::min(memory, kFixedMemory)) / 2),
+      normals_(place, positions_.memory()),
       table_(kTable) {
   local_positions_.reserve(3 * kRun);
   local_normals_.reserve(3 * kRun);

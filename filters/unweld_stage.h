@@ -21,20 +21,22 @@ class UnweldStage final : public FilterStage {
 
  private:
   /// Triangles of a chunk.
-  static constexpr std::size_t kRun = std::size_t{1} << 14;
+  static constexpr std::size_t kRun = std::size_t{1} << 12;
   static constexpr std::size_t kTable = kRun * 8;  ///< a power of two, for 3 vertices a triangle
 
   struct Entry {
     std::uint32_t vertex = 0, local = 0;
     std::uint32_t chunk = 0;  ///< whose entry it is; free in all others
   };
+  /// Of the table and of a chunk.
+  static constexpr std::uint64_t kFixedMemory =
+      kTable * sizeof(Entry) + 3 * kRun * 2 * sizeof(Vec3f) + kRun * sizeof(Triangle);
 
   std::uint64_t own_bytes() const override {
     return positions_.file_bytes() + normals_.file_bytes();
   }
   std::uint64_t own_memory() const override {
-    return positions_.memory() + normals_.memory() + kTable * sizeof(Entry) +
-           3 * kRun * 2 * sizeof(Vec3f) + kRun * sizeof(Triangle);
+    return positions_.memory() + normals_.memory() + kFixedMemory;
   }
   std::uint32_t local_of(std::uint32_t vertex);
   void write_run(std::span<const Triangle> triangles);

@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 #include <stop_token>
+#include <string>
 
 #include <isobrick/api.h>
 #include <isobrick/mesh.h>
@@ -27,6 +28,7 @@ struct MeshMeasure {
   /// Nothing where the mesh is open, for then it encloses none.
   std::optional<double> volume = {};
   std::optional<MeshBounds> bounds = {};  ///< of the vertices; nothing where there is none
+  std::string unit = {};                  ///< of lengths, as unit_name() has it; empty: unknown
 
   /// Whether every side has its reverse. So has every side of a mesh without triangles.
   bool is_closed() const { return open_sides == 0; }
