@@ -5,11 +5,13 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <tuple>
 #include <utility>
 
 #include <isobrick/error.h>
 #include <isobrick/pod_buffer.h>
 #include "bricks/ranges/brick_checksums.h"
+#include "bricks/ranges/item_array.h"
 #include "bricks/ranges/lru_cache.h"
 #include "bricks/ranges/range_array.h"
 #include "bricks/ranges/stored_ranges.h"
@@ -67,6 +69,7 @@ struct StoreReader::Impl {
   void open(const Selection& selection);
   std::optional<StoredRanges> find_ranges() const;
   void open_level(const ImageMetadata::Level& described, MetadataFiles::Level&& read);
+  void hint_ranges() const;
   void open_ranges(int level, const RangeChecksums& checksums);
   void check_level(int level) const;
   void check_brick(int level, Int3 b) const;
@@ -78,6 +81,8 @@ struct StoreReader::Impl {
   [[noreturn]] void missing_shard(int level, Int3 s, const char* why) const;
   std::shared_ptr<const StoredObject> shard_object(int level, Int3 s);
   std::shared_ptr<const ShardIndex> shard_index(int level, Int3 s);
+  std::pair<std::uint64_t, std::uint64_t> index_place(int level, std::uint64_t size) const;
+  void hint_shards(int level, std::span<const Int3> bricks);
   std::optional<Place> find_unchecked(int level, Int3 b);
   std::optional<Place> find(int level, Int3 b);
   void check_content(int level, Int3 b, const Place& place, std::uint32_t checksum);
@@ -117,6 +122,7 @@ void StoreReader::Impl::open(const Selection& selection) {
   std::optional<bool> may_have_nan = image.may_have_nan;
   if (const std::optional<StoredRanges> ranges = find_ranges()) {
     if (!image.ours) may_have_nan = ranges->may_have_nan;
+    hint_ranges();
     for (std::size_t i = 0; i < levels.size(); ++i)
       open_ranges(static_cast<int>(i), ranges->levels[i]);
   }
@@ -138,6 +144,13 @@ std::optional<StoredRanges> StoreReader::Impl::find_ranges() const {
     throw DamageError(fmt::format("{}: these are the ranges of another store",
                                   quoted(*storage, ranges_file(info.additions))));
   return std::nullopt;
+}
+
+/// Where requests take long, those of all arrays overlap.
+void StoreReader::Impl::hint_ranges() const {
+  for (int level = 0; level < static_cast<int>(levels.size()); ++level)
+    for (const auto folder : {brick_range_folder, block_range_folder, brick_checksum_folder})
+      ItemArrayReader::will_open(*storage, folder(info.additions, level));
 }
 
 // Ranges of other extents than the level's show a shape that cannot be right
@@ -229,6 +242,33 @@ std::shared_ptr<const StoredObject> StoreReader::Impl::shard_object(int level, I
   });
 }
 
+/// Bytes of a shard's index and where they begin in a shard of so many bytes.
+std::pair<std::uint64_t, std::uint64_t> StoreReader::Impl::index_place(int level,
+                                                                       std::uint64_t size) const {
+  const ArrayMetadata::Sharding& sharding = *at(level).metadata.sharding;
+  const std::uint64_t bricks = at(level).grid.shard_bricks() * at(level).place.shard_volumes;
+  const std::uint64_t bytes = ShardIndex::encoded_size(bricks, sharding.index_has_crc);
+  return {bytes, sharding.index_at_end && size > bytes ? size - bytes : 0};
+}
+
+/// Hints that the shards of bricks are opened soon, and then that their indices are read.
+void StoreReader::Impl::hint_shards(int level, std::span<const Int3> bricks) {
+  std::vector<Int3> shards;
+  for (const Int3 b : bricks) shards.push_back(shard_of(level, b));
+  const auto order = [](Int3 a, Int3 b) {
+    return std::tuple(a.z, a.y, a.x) < std::tuple(b.z, b.y, b.x);
+  };
+  std::sort(shards.begin(), shards.end(), order);
+  shards.erase(std::unique(shards.begin(), shards.end()), shards.end());
+  for (const Int3 s : shards) storage->will_open(shard_key(level, s));
+  if (!at(level).metadata.sharding) return;
+  for (const Int3 s : shards)
+    if (const auto object = shard_object(level, s)) {
+      const auto [bytes, begin] = index_place(level, object->size());
+      object->will_need(begin, bytes);
+    }
+}
+
 std::shared_ptr<const ShardIndex> StoreReader::Impl::shard_index(int level, Int3 s) {
   return indices.get(shard_number(level, s), [&] {
     const std::uint64_t bricks = at(level).grid.shard_bricks() * at(level).place.shard_volumes;
@@ -237,13 +277,13 @@ std::shared_ptr<const ShardIndex> StoreReader::Impl::shard_index(int level, Int3
     if (!object) return std::pair(std::make_shared<const ShardIndex>(0), index_weight(0));
     const ArrayMetadata::Sharding& sharding = *at(level).metadata.sharding;
     const std::uint64_t size = object->size();
-    const std::uint64_t index_size = ShardIndex::encoded_size(bricks, sharding.index_has_crc);
+    const auto [index_size, begin] = index_place(level, size);
     try {
       if (size < index_size)
         throw DamageError(
             fmt::format("{} bytes are too few for the index of {} bricks", size, bricks));
       std::vector<std::byte> bytes(index_size);
-      object->read(sharding.index_at_end ? size - index_size : 0, bytes);
+      object->read(begin, bytes);
       bytes_read += index_size;
       return std::pair(std::make_shared<const ShardIndex>(
                            ShardIndex::decode(bytes, sharding.index_has_crc, size)),
@@ -399,6 +439,16 @@ std::uint32_t StoreReader::Impl::read(int level, Int3 b, const Place& place, std
 void StoreReader::will_need(int level, Int3 b) const {
   if (const auto place = impl_->find(level, b))
     place->object->will_need(place->offset, place->size);
+}
+
+void StoreReader::will_need(int level, std::span<const Int3> bricks) const {
+  if (impl_->storage->is_remote()) impl_->hint_shards(level, bricks);
+  for (const Int3 b : bricks) will_need(level, b);
+}
+
+bool StoreReader::reads_memory() const {
+  // What was fetched ahead over a network comes from memory because of the hints.
+  return !impl_->storage->is_remote() && brick_times().from_memory();
 }
 
 std::uint64_t StoreReader::bytes_read() const { return impl_->bytes_read; }

@@ -45,6 +45,11 @@ std::vector<std::string> index_folder_kinds(const StoreReader& store, int level)
   return kinds;
 }
 
+void hint_index(const StoreReader& store, int level, const std::string& kind) {
+  const std::string folder = index_folder(store.info().additions, level, kind);
+  store.storage()->will_open(description_key(folder));
+}
+
 bool has_index(const StoreReader& store, int level, const std::string& kind) {
   const std::string folder = index_folder(store.info().additions, level, kind);
   return store.storage()->open(description_key(folder)) != nullptr;

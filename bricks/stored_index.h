@@ -23,6 +23,8 @@ std::vector<std::string> stored_index_kinds(const StoreReader& store, int level)
 /// be looked at.
 std::vector<std::string> index_folder_kinds(const StoreReader& store, int level);
 bool has_index(const StoreReader& store, int level, const std::string& kind);
+/// Hints that has_index() is called soon.
+void hint_index(const StoreReader& store, int level, const std::string& kind);
 
 /// One index of one level. Thread-safe after construction; does not need the reader any more.
 class StoredIndex {

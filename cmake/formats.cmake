@@ -73,3 +73,8 @@ set(isobrick_openvdb_libraries ${ISOBRICK_OPENVDB_LIBRARY})
 if(ISOBRICK_IMATH_LIBRARY)
   list(APPEND isobrick_openvdb_libraries ${ISOBRICK_IMATH_LIBRARY})
 endif()
+
+# Stores behind URLs. 7.85 has the options by name of protocols.
+find_package(CURL 7.85 QUIET)
+isobrick_found_option(ISOBRICK_CURL "Read stores from URLs" "${CURL_FOUND}" libcurl
+  "stores behind URLs cannot be read")

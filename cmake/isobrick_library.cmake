@@ -6,7 +6,7 @@ if(NOT BUILD_SHARED_LIBS)
   return()
 endif()
 
-set(isobrick_parts core index surface bytes volumes meshes filters bricks stream pipeline)
+set(isobrick_parts core index surface bytes http volumes meshes filters bricks stream pipeline)
 foreach(part vtk gpu)
   if(TARGET isobrick_${part})
     list(APPEND isobrick_parts ${part})

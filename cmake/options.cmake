@@ -81,3 +81,22 @@ function(isobrick_library name)
   isobrick_precompiled(isobrick_${name})
   set_property(GLOBAL APPEND PROPERTY isobrick_libraries isobrick_${name})
 endfunction()
+
+# Libraries that take longer to link than most commands take are in modules of their own, loaded
+# when they are needed (io/bytes/module.h): isobrick_module(name SOURCES … LINK … INCLUDE …).
+# The target isobrick_modules is all of them, for what loads some.
+add_custom_target(isobrick_modules)
+function(isobrick_module name)
+  cmake_parse_arguments(arg "" "" "SOURCES;LINK;INCLUDE" ${ARGN})
+  set(target isobrick_${name})
+  set(folder ${CMAKE_INSTALL_LIBDIR}/isobrick)
+  add_library(${target} MODULE ${arg_SOURCES})
+  set_target_properties(${target} PROPERTIES PREFIX ""
+    LIBRARY_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/${folder})
+  target_compile_definitions(${target} PRIVATE ISOBRICK_VERSION="${PROJECT_VERSION}")
+  target_include_directories(${target} PRIVATE ${PROJECT_SOURCE_DIR})
+  target_include_directories(${target} SYSTEM PRIVATE ${arg_INCLUDE})
+  target_link_libraries(${target} PRIVATE isobrick_core isobrick_flags fmt::fmt TBB::tbb ${arg_LINK})
+  add_dependencies(isobrick_modules ${target})
+  install(TARGETS ${target} LIBRARY DESTINATION ${folder})
+endfunction()

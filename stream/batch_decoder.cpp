@@ -28,7 +28,7 @@ std::size_t BatchDecoder::piece_bricks(const Lattice& lattice, std::size_t capac
 BatchDecoder::BatchDecoder(const StoreReader& store, int level, BatchPlanner& planner, Index reach,
                            std::size_t capacity, int threads, BrickMemory& memory)
     : reader_(store, level),
-      planner_(planner),
+      batches_planned_(planner, reader_),
       capacity_(capacity),
       threads_count_(threads),
       bricks_of_job_(std::clamp<std::size_t>(kJobBytes / reader_.lattice().brick_bytes(), 1, 64)),
@@ -102,7 +102,7 @@ void BatchDecoder::plan() {
 /// An index is searched in parallel.
 bool BatchDecoder::next_planned(TileBatch& batch) {
   tbb::task_arena arena(threads_count_);
-  return arena.execute([&] { return planner_.next(batch); });
+  return arena.execute([&] { return batches_planned_.next(batch); });
 }
 
 void BatchDecoder::begin(const Batch& batch) {
@@ -147,7 +147,7 @@ BrickLoad BatchDecoder::place(BatchBricks& bricks) {
 }
 
 void BatchDecoder::hint(const TileBatch& batch) {
-  if (!reader_.reads_disk()) return;
+  if (!reader_.reads_disk() || reader_.reads_network()) return;  // hinted at already
   std::vector<Int3> missing;
   const std::lock_guard lock(mutex_);
   std::copy_if(batch.bricks.begin(), batch.bricks.end(), std::back_inserter(missing),

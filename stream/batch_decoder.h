@@ -15,6 +15,7 @@
 
 #include <isobrick/store_reader.h>
 #include "stream/batch_bricks.h"
+#include "stream/batch_lookahead.h"
 #include "stream/brick_memory.h"
 #include "stream/brick_reader.h"
 #include "stream/brick_slots.h"
@@ -98,7 +99,7 @@ class BatchDecoder {
   void wait(std::unique_lock<std::mutex>& lock, const Ready& ready);
 
   const BrickReader reader_;
-  BatchPlanner& planner_;
+  BatchLookahead batches_planned_;
   const std::size_t capacity_;
   const int threads_count_;
   const std::size_t bricks_of_job_;

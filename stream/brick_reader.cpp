@@ -102,7 +102,7 @@ bool BrickReader::read(Int3 brick, std::byte* out) const {
 }
 
 void BrickReader::will_need(std::span<const Int3> bricks) const {
-  for (const Int3 b : bricks) store_.will_need(level_, b);
+  store_.will_need(level_, bricks);
 }
 
 /// An absent brick has no `samples`.

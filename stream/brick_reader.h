@@ -22,7 +22,9 @@ class BrickReader {
   /// outside of the range.
   bool read(Int3 brick, std::byte* out) const;
   /// Whether will_need() can gain anything.
-  bool reads_disk() const { return !store_.brick_times().from_memory(); }
+  bool reads_disk() const { return !store_.reads_memory(); }
+  /// Whether bricks come from another machine.
+  bool reads_network() const { return store_.storage()->is_remote(); }
   /// Hints to the disk that these bricks are read soon.
   void will_need(std::span<const Int3> bricks) const;
 

@@ -18,7 +18,7 @@ class StoreBricks final : public BrickSource {
     return store_->read_brick(level, brick, out);
   }
   void will_need(int level, Int3 brick) const override {
-    if (!store_->brick_times().from_memory()) store_->will_need(level, brick);
+    if (!store_->reads_memory()) store_->will_need(level, brick);
   }
   RangeTable brick_ranges(int level, Box3 box) const override {
     return store_->brick_ranges(level, box);

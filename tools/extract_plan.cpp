@@ -237,6 +237,8 @@ std::string shortage_text(const PlannedMesh& mesh, const Shortage& shortage, boo
 }  // namespace
 
 void check_arguments(const ExtractArguments& arguments) {
+  for (const std::string& output : {arguments.output, arguments.preview.path})
+    refuse_url_output(output);
   form_of(arguments);
   check_filters(arguments.filters, arguments.estimate);
   if (is_standard_output(arguments.output) && is_standard_output(arguments.preview.path))

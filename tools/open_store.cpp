@@ -12,6 +12,7 @@
 #include "bricks/zarr/metadata_files.h"
 #include "core/shell_word.h"
 #include "io/bytes/folder_walk.h"
+#include "io/bytes/url.h"
 #include "io/meshes/mesh_name.h"
 #include "io/volumes/open/volume_format.h"
 #include "io/volumes/raw/raw_name.h"
@@ -99,6 +100,7 @@ void refuse_outer_folder(const fs::path& path, const char* wanted) {
 }  // namespace
 
 void check_store(const std::string& path) {
+  if (is_url(path)) return;
   std::error_code ignored;
   const fs::file_status status = fs::status(path, ignored);
   if (!fs::exists(status)) refuse_missing(path);
@@ -113,6 +115,7 @@ void refuse_folder_of_zarr(const std::string& path) {
 }
 
 void check_input(const std::string& path) {
+  if (is_url(path)) return;
   const std::string file = path == "-" ? path : split_volume_path(path).file;
   std::error_code ignored;
   const fs::file_status status = fs::status(file, ignored);

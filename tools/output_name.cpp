@@ -6,6 +6,7 @@
 
 #include <isobrick/error.h>
 #include "io/bytes/output_file.h"
+#include "io/bytes/url.h"
 #include "io/volumes/open/volume_format.h"
 #include "tools/format.h"
 
@@ -45,6 +46,10 @@ void refuse_misleading_name(const std::string& path, std::span<const std::string
     throw UsageError(fmt::format("'{}' would not have the format of its name; {}", path, instead));
 }
 
+void refuse_url_output(const std::string& path) {
+  if (is_url(path)) throw UsageError(fmt::format("'{}': nothing can be written to a URL", path));
+}
+
 void check_picture_name(const std::string& path) {
   if (is_standard_output(path)) return;
   const std::string extension = extension_of(path);
@@ -57,6 +62,7 @@ void check_store_name(const std::string& path) {
   if (is_standard_output(path))
     throw UsageError(
         "a store is a folder and cannot go to standard output; name it, such as OUT.zarr");
+  refuse_url_output(path);
   constexpr std::string_view own[] = {".zarr", ".zip", ".ozx"};
   refuse_misleading_name(
       path, own,

@@ -18,6 +18,9 @@ inline bool is_standard_output(std::string_view path) { return path == "-"; }
 void refuse_misleading_name(const std::string& path, std::span<const std::string_view> own,
                             std::string_view instead);
 
+/// Refuses the URL of an output, which the file layer would take for a path.
+void refuse_url_output(const std::string& path);
+
 /// Throws UsageError for a picture that is neither named .png, nor without extension, nor on
 /// standard output.
 void check_picture_name(const std::string& path);

@@ -111,6 +111,10 @@ std::optional<std::uint32_t> ItemArrayWriter::finish() {
   return all.back();
 }
 
+void ItemArrayReader::will_open(const Storage& storage, const std::string& folder) {
+  for (const char* name : {"zarr.json", kChecksums}) storage.will_open(join_key(folder, name));
+}
+
 ItemArrayReader::ItemArrayReader(std::shared_ptr<const Storage> storage, std::string folder,
                                  Int3 items, ArrayMetadata array, std::uint32_t crc32c)
     : storage_(std::move(storage)),

@@ -61,6 +61,8 @@ class ItemArrayWriter {
 /// Reads such an array. Thread-safe.
 class ItemArrayReader {
  public:
+  /// Hints that the array in `folder` is opened soon.
+  static void will_open(const Storage& storage, const std::string& folder);
   /// Throws DamageError when the array is not `array`. `folder` is a key, `crc32c` what
   /// ItemArrayWriter::finish() returned.
   ItemArrayReader(std::shared_ptr<const Storage> storage, std::string folder, Int3 items,

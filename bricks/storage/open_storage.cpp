@@ -4,7 +4,9 @@
 
 #include <isobrick/error.h>
 #include <isobrick/storage.h>
+#include "bricks/storage/remote_storage.h"
 #include "io/bytes/file.h"
+#include "io/bytes/url.h"
 #include "io/bytes/zip_signature.h"
 
 namespace isobrick::inline v0 {
@@ -18,6 +20,7 @@ bool is_zip(const fs::path& path) {
 }
 
 std::shared_ptr<const Storage> open_storage(const fs::path& path) {
+  if (is_url(path.native())) return open_remote_storage(path.native());
   std::error_code failure;
   const fs::file_status status = fs::status(path, failure);
   if (status.type() == fs::file_type::none)

@@ -13,6 +13,10 @@ void StoredObject::will_need(std::uint64_t /*offset*/, std::uint64_t /*size*/) c
 
 std::string Storage::name_of(const std::string& key) const { return name() + ":/" + key; }
 
+void Storage::will_open(const std::string& /*key*/) const {}
+
+bool Storage::is_remote() const { return false; }
+
 std::filesystem::path Storage::local_path() const { return {}; }
 
 std::string join_key(std::string_view folder, std::string_view name) {

@@ -267,6 +267,10 @@ const ZipEntry* ZipDirectory::find(const std::string& name) const {
   return entry != nullptr && entry->name == name ? entry : nullptr;
 }
 
+void ZipDirectory::will_need(const StoredObject& zip, const ZipEntry& entry) {
+  zip.will_need(entry.header, kLocalHeaderBytes + entry.name.size());
+}
+
 std::uint64_t ZipDirectory::data_of(const StoredObject& zip, const ZipEntry& entry) const {
   const std::vector<std::byte> header =
       read(zip, entry.header, kLocalHeaderBytes + entry.name.size());

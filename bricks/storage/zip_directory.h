@@ -34,6 +34,8 @@ class ZipDirectory {
   /// Where the bytes of a stored entry begin; they all lie within the zip. Reads the entry's own
   /// header. Throws DamageError when that contradicts the directory.
   std::uint64_t data_of(const StoredObject& zip, const ZipEntry& entry) const;
+  /// Hints that data_of() is called soon.
+  static void will_need(const StoredObject& zip, const ZipEntry& entry);
 
  private:
   std::vector<ZipEntry> entries_;

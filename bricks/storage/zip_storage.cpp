@@ -65,6 +65,11 @@ class ZipStorage final : public Storage {
   std::vector<std::string> list(const std::string& folder) const override {
     return names_below(folder.empty() ? top_.substr(0, top_.find('/')) : top_ + folder);
   }
+  void will_open(const std::string& key) const override {
+    if (const ZipEntry* const entry = directory_.find(top_ + key))
+      directory_.will_need(*zip_, *entry);
+  }
+  bool is_remote() const override { return path_.empty(); }  // as far as anybody knows
   std::filesystem::path local_path() const override { return path_; }
 
  private:

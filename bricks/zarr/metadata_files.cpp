@@ -12,6 +12,7 @@
 #include "bricks/zarr/lone_array.h"
 #include "bricks/zarr/store_names.h"
 #include "bricks/zarr/zarr_v2.h"
+#include "io/bytes/url.h"
 
 namespace isobrick::inline v0 {
 namespace {
@@ -42,6 +43,7 @@ std::optional<Text> read_array(const Storage& storage, const std::string& folder
 
 /// A group in the words of version 3, or that of an array alone.
 Text read_root(const Storage& storage) {
+  for (const char* name : kZarrFiles) storage.will_open(name);
   const auto v3 = read_text(storage, "zarr.json");
   if (v3) {
     const nlohmann::json parsed = parse_json(*v3, quoted(storage, "zarr.json"));
@@ -92,6 +94,10 @@ MetadataFiles read_metadata_files(const Storage& storage) {
   MetadataFiles files;
   files.root = root.key;
   files.image = parse_image_metadata(root.json, root_name);
+  for (const ImageMetadata::Level& level : files.image.levels)
+    for (const char* name : kZarrFiles)
+      if ((root.key == "zarr.json") == (name == kZarrFiles.front()))
+        storage.will_open(join_key(level.path, name));
   std::vector<std::string> texts;
   for (const ImageMetadata::Level& level : files.image.levels) {
     const std::string folder = join_key(level.path, "");
@@ -111,6 +117,7 @@ MetadataFiles read_metadata_files(const Storage& storage) {
 }
 
 bool is_zarr(const fs::path& path) {
+  if (is_url(path.native())) return true;
   if (is_zip(path)) return true;
   return std::ranges::any_of(kZarrFiles, [&](const char* name) { return fs::exists(path / name); });
 }

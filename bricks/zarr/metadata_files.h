@@ -29,7 +29,7 @@ struct MetadataFiles {
 /// DamageError when a file is broken or missing.
 MetadataFiles read_metadata_files(const Storage& storage);
 
-/// Whether a folder looks like Zarr of any version, or a file is a zip, in which it may lie.
+/// Whether a folder looks like Zarr of any version. A zip and a URL count, in which it may lie.
 bool is_zarr(const std::filesystem::path& path);
 
 }  // namespace isobrick

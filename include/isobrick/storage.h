@@ -48,9 +48,14 @@ class ISOBRICK_API Storage {
   /// Opens an object; null where there is none. Throws Error where it cannot be known. A reader
   /// keeps at most 128 objects open, and may close and open them again.
   virtual std::shared_ptr<const StoredObject> open(const std::string& key) const = 0;
+  /// Hints that an object is opened soon: an implementation may begin to. Waits for nothing and
+  /// throws nothing.
+  virtual void will_open(const std::string& key) const;
   /// The first part of each key below "`folder`/", or of each key where `folder` is empty; in no
   /// particular order. Throws Error where it cannot be known.
   virtual std::vector<std::string> list(const std::string& folder) const = 0;
+  /// Whether objects are on another machine: reads take long to begin, hints count.
+  virtual bool is_remote() const;
   /// The folder or file on this machine in which all objects lie; empty where there is none.
   virtual std::filesystem::path local_path() const;
 };
@@ -86,8 +91,34 @@ struct StorageFunctions {
 ISOBRICK_API std::shared_ptr<const Storage> function_storage(StorageFunctions functions,
                                                              std::string name);
 
-/// A folder or a zip, whichever `path` is. Throws Error where it is neither or cannot be looked at,
-/// and what zip_storage() does.
+/// How objects behind a URL are read.
+struct RemoteOptions {
+  std::uint64_t memory = std::uint64_t{64} << 20;  ///< bytes that are fetched ahead at most
+  int max_requests = 32;                           ///< under way at the same time
+  /// Of each request: failures of the network and the statuses 408, 429, 500, 502, 503 and 504 are
+  /// tried again, after pauses that double, or the one that the server asks for.
+  int tries = 7;
+  double timeout_seconds = 30;  ///< without a connection or a byte
+  /// Ends requests, and reads that wait for them, with Cancelled.
+  std::stop_token cancel = {};
+};
+
+/// The objects below a URL: https://…, http://… or s3://BUCKET/PATH. Reads ranges of bytes, many at
+/// a time, and those of StoredObject::will_need() ahead; close ones with one request. Where a server
+/// names the state of an object (ETag), all its bytes are of one state.
+///
+/// S3: the variables AWS_ACCESS_KEY_ID, AWS_SECRET_ACCESS_KEY, AWS_SESSION_TOKEN, AWS_PROFILE,
+/// AWS_REGION, AWS_ENDPOINT_URL_S3 and the files ~/.aws/credentials and ~/.aws/config count, as for
+/// Amazon's tools. Without credentials, or with AWS_NO_SIGN_REQUEST, requests are anonymous. A
+/// place that may not be looked at (403) counts as empty, because S3 says so of missing objects.
+///
+/// Objects of http and https cannot be listed: list() returns nothing. Throws UsageError for a URL
+/// that makes no sense or where this was built without libcurl; reads throw Error.
+ISOBRICK_API std::shared_ptr<const Storage> remote_storage(const std::string& url,
+                                                           const RemoteOptions& options = {});
+
+/// A folder, a zip or the URL of either, whichever `path` is. Throws Error where it is neither or
+/// cannot be looked at, and what zip_storage() and remote_storage() do.
 ISOBRICK_API std::shared_ptr<const Storage> open_storage(const std::filesystem::path& path);
 
 /// How write_zip() writes.

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -97,6 +98,10 @@ class ISOBRICK_API StoreReader {
   /// Hints that brick `b` is read soon, as StoredObject::will_need(). Finds the brick first: reads
   /// its shard's index where that is not cached, and throws as read_brick() does for its place.
   void will_need(int level, Int3 b) const;
+  /// The same of several bricks. Where requests take long, those of different shards overlap.
+  void will_need(int level, std::span<const Int3> bricks) const;
+  /// Whether these hints gain nothing: BrickTimes::from_memory() of objects on this machine.
+  bool reads_memory() const;
 
   /// Bytes read from the storage so far (bricks, indices, ranges).
   std::uint64_t bytes_read() const;

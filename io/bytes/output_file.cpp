@@ -16,6 +16,7 @@
 #include <isobrick/error.h>
 #include "io/bytes/leftovers.h"
 #include "io/bytes/rename.h"
+#include "io/bytes/url.h"
 
 namespace isobrick::inline v0 {
 namespace {
@@ -147,6 +148,7 @@ File FileWriter::share() const { return file_.share(); }
 void check_output(const std::string& path, bool force) {
   if (path.empty()) throw UsageError("the output has no name");
   if (path == kStandardOutput) return;
+  if (is_url(path)) throw UsageError(fmt::format("'{}': nothing can be written to a URL", path));
   struct stat status {};
   if (::lstat(path.c_str(), &status) != 0) return;  // whatever is wrong shows when it is created
   const bool is_link = S_ISLNK(status.st_mode);

@@ -4,6 +4,7 @@
 #include <tbb/task_arena.h>
 
 #include <utility>
+#include <vector>
 
 #include <isobrick/open_source.h>
 #include <isobrick/store_reader.h>
@@ -26,6 +27,7 @@ class StoreSource final : public VolumeSource {
     info_.fill_value = store_.info().fill_value;
     info_.grid_class = store_.info().grid_class;
     info_.grid_name = store_.info().grid_name;
+    if (store_.storage()->is_remote()) info_.files.clear();
   }
 
   const VolumeInfo& info() const override { return info_; }
@@ -36,7 +38,16 @@ class StoreSource final : public VolumeSource {
   std::size_t memory() const override {
     return static_cast<std::size_t>(slab_memory(store_.info(), 0, threads_));
   }
+  void will_need(Box3 box) override {
+    if (!store_.storage()->is_remote()) return;
+    const Int3 brick = store_.info().levels.front().lattice.brick;
+    std::vector<Int3> bricks;
+    for_each_point({floor_div(box.lo, brick), ceil_div(box.hi, brick)},
+                   [&](Int3 b) { bricks.push_back(b); });
+    store_.will_need(0, bricks);
+  }
   void read(Box3 box, std::byte* out) override {
+    will_need(box);  // its requests overlap
     arena_.execute([&] { read_slab(store_, 0, box, out); });
   }
 

@@ -8,6 +8,7 @@
 #include "core/stopwatch.h"
 #include "pipeline/extract/extract_tiles.h"
 #include "pipeline/workers.h"
+#include "stream/batch_lookahead.h"
 #include "stream/brick_cache.h"
 
 namespace isobrick::inline v0 {
@@ -61,14 +62,15 @@ struct CpuBatch {
 class CpuBatches {
  public:
   CpuBatches(const Work& work, BatchPlanner& planner)
-      : planner_(planner),
+      : reader_(work.store, work.options.level),
+        batches_(planner, reader_),
         cache_(work.store, work.options.level, reach_of(work.requests), work.plan.cache_bricks) {
-    planner_.next(planned_);
+    batches_.next(planned_);
   }
 
   CpuBatch next() {
     CpuBatch next{.batch = std::exchange(planned_, {})};
-    if (!next.batch.tiles.empty()) planner_.next(planned_);
+    if (!next.batch.tiles.empty()) batches_.next(planned_);
     return next;
   }
 
@@ -76,13 +78,14 @@ class CpuBatches {
   void begin(CpuBatch& batch) {
     if (batch.batch.tiles.empty()) return;
     batch.bricks = cache_.begin(batch.batch.bricks, batch.batch.tiles.back().tile);
-    cache_.will_need(*batch.bricks, planned_.bricks);
+    if (!reader_.reads_network()) cache_.will_need(*batch.bricks, planned_.bricks);
   }
 
   const BrickCache& cache() const { return cache_; }
 
  private:
-  BatchPlanner& planner_;
+  const BrickReader reader_;
+  BatchLookahead batches_;
   BrickCache cache_;
   TileBatch planned_;
 };

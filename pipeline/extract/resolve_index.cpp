@@ -2,6 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <array>
+#include <string>
+
 #include <isobrick/error.h>
 #include "bricks/stored_index.h"
 
@@ -13,8 +16,10 @@ namespace {
 /// than the blocks themselves only add to what is read. The order is that of the
 /// figures in docs/experiments/2026-11-index.md.
 SearchMethod fastest(const StoreReader& store, int level) {
-  for (const IndexKind kind :
-       {IndexKind::octree, IndexKind::kdtree, IndexKind::interval, IndexKind::quadtree}) {
+  constexpr std::array kinds{IndexKind::octree, IndexKind::kdtree, IndexKind::interval,
+                             IndexKind::quadtree};
+  for (const IndexKind kind : kinds) hint_index(store, level, std::string(name_of(kind)));
+  for (const IndexKind kind : kinds) {
     const std::string name(name_of(kind));
     if (has_index(store, level, name) &&
         StoredIndex(store, level, name).layout().leaf == kBlockEdge)

@@ -10,8 +10,8 @@
     volume.extract("otsu", level=1, normals=True)
     isobrick.render(volume, "otsu")                                # a picture in a notebook
 
-Axis order: arrays and all that indexes them (shape, roi, brick) are [z, y, x]. World space (spacing,
-origin, direction, vertices, normals) is x, y, z, as in VTK, SimpleITK and nibabel. Only
+Axis order: arrays and all that indexes them (shape, roi, brick) are [z, y, x]. World space
+(spacing, origin, direction, vertices, normals) is x, y, z, as in VTK, SimpleITK and nibabel. Only
 `marching_cubes`, which stands in for scikit-image's, has everything in the order of the array.
 
 Long operations take `progress=`, leave the GIL to other threads, and end within a second of Ctrl-C.
@@ -23,9 +23,10 @@ from ._extract import Extractor, extract
 from ._isobrick import __version__
 from ._marching_cubes import marching_cubes
 from ._mesh import Measure, Mesh
+from ._open import open
 from ._operations import convert, export, index, info, synth, verify
 from ._picture import Picture, render
-from ._volume import Histogram, Level, Volume, open
+from ._volume import Histogram, Level, Volume
 
 __all__ = [
     "DamageError",

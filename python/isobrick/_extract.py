@@ -1,8 +1,8 @@
 """Surfaces of arrays."""
 
 from ._arguments import (
-    box_of, byte_count, extract_options, filter_options, histogram_bins, is_list, mesh_file_options, number, one_isovalue,
-    path_text, thread_count,
+    box_of, byte_count, extract_options, filter_options, histogram_bins, is_list,
+    mesh_file_options, number, one_isovalue, path_text, thread_count,
 )
 from ._device import DeviceMesh, DeviceSamples, is_on_device
 from ._errors import UsageError

@@ -7,7 +7,7 @@ import numpy as np
 from ._errors import Error
 from ._indexing import read_indexed
 from ._operations import info
-from ._volume import open as open_volume
+from ._open import open as open_volume
 
 
 class LevelArray:

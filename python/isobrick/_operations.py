@@ -5,9 +5,10 @@ import numpy as np
 from . import _isobrick
 from ._arguments import byte_count, check_names, integer, integers, number, path_text, thread_count
 from ._errors import UsageError
+from ._open import open, source_path, volume_request
 from ._progress import reporting
 from ._samples import ARRAY_NAMES, Samples
-from ._volume import Volume, open, source_path, volume_request
+from ._volume import Volume
 
 __all__ = ["convert", "export", "index", "info", "synth", "verify"]
 
@@ -19,7 +20,9 @@ def _convert_options(
     options = _isobrick.ConvertOptions()
     options.brick = None if brick is None else integer(brick, "brick", -(2**31), 2**31 - 1)
     options.shard = None if shard is None else integer(shard, "shard", -(2**31), 2**31 - 1)
-    options.zstd_level = None if compression is None else integer(compression, "compression", -(2**31), 2**31 - 1)
+    options.zstd_level = (
+        None if compression is None else integer(compression, "compression", -(2**31), 2**31 - 1)
+    )
     options.levels = None if levels is None else integer(levels, "levels", -(2**31), 2**31 - 1)
     if str(ome) not in ("0.4", "0.5"):
         raise UsageError(f"ome must be '0.4' or '0.5', not {ome!r}")

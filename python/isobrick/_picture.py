@@ -10,9 +10,10 @@ from ._device import DeviceMesh
 from ._errors import Error, UsageError
 from ._extract import Extractor
 from ._mesh import Mesh
+from ._open import open, volume_request
 from ._progress import reporting
 from ._samples import ARRAY_NAMES
-from ._volume import Volume, open, volume_request
+from ._volume import Volume
 
 _MESH_FILES = (".ply", ".stl", ".obj", ".glb", ".vtp", ".pvtp")
 _FAR = 1e30  # beyond every mesh, and no infinity that would make NaN
@@ -25,8 +26,8 @@ def _module():
     except ImportError as error:
         if error.name == f"{__package__}._render":
             why = (
-                "this package was built without it; build it where libepoxy, GLM, GLFW, Dear ImGui, "
-                "stb and the font DejaVu Sans are installed (ISOBRICK_VIEWER)"
+                "this package was built without it; build it where libepoxy, GLM, GLFW, Dear "
+                "ImGui, stb and the font DejaVu Sans are installed (ISOBRICK_VIEWER)"
             )
         else:
             why = str(error)

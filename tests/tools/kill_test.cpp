@@ -1,3 +1,4 @@
+#include <array>
 #include <csignal>
 #include <map>
 #include <set>
@@ -119,31 +120,33 @@ TEST_F(Killed, AnotherInputIsNoticedUntilTheEnd) {
 TEST_F(Killed, AReplacementGoesOn) {
   if (skipped_) GTEST_SKIP();
   const Tree expected = made_of("new.raw"), old = made_of("old.raw");
-  for (const bool exchange : {true, false})
-    for (const Arguments& again :
-         {Arguments{"--force"}, Arguments{"--resume", "--force"}, Arguments{"--resume"}}) {
-      int at = 0;
-      for (bool killed = true; killed; ++at) {
-        copy_anew(path("made of old.raw"), path("out.zarr"));
-        killed = run_until(at, convert("new.raw", {"--force"}), exchange);
-        if (exchange) {
-          // One of the two stores is whole under its name at any time.
-          EXPECT_EQ(run({"verify", path("out.zarr")}).exit_code, 0) << at;
-        }
-        const Outcome outcome = run(convert("new.raw", again));
-        if (again.size() == 1 && again[0] == "--resume" && outcome.exit_code != 0) {
-          expect_refused(outcome, 2, {"out.zarr' exists"});
-          const bool goes_on = outcome.err.find("--resume --force goes on") != std::string::npos;
-          EXPECT_EQ(goes_on, fs::exists(path("out.zarr.partial/.isobrick-layout.json"))) << at;
-          succeeds(convert("new.raw", {"--resume", "--force"}), at);
-        } else {
-          EXPECT_EQ(outcome.exit_code, 0) << at << ": " << outcome.err;
-        }
-        EXPECT_TRUE(tree(path("out.zarr")) == expected) << at;
-        expect_only({"made of new.raw", "made of old.raw", "new.raw", "old.raw", "out.zarr"}, at);
+  const std::array<Arguments, 3> ways{Arguments{"--force"}, {"--resume", "--force"}, {"--resume"}};
+  for (const bool exchange : {true, false}) {
+    std::size_t at = 0;
+    for (bool killed = true; killed; ++at) {
+      // Every point in one way to go on, which differs between the two loops.
+      const Arguments& again = ways[(at + exchange) % ways.size()];
+      copy_anew(path("made of old.raw"), path("out.zarr"));
+      killed = run_until(static_cast<int>(at), convert("new.raw", {"--force"}), exchange);
+      if (exchange) {
+        // One of the two stores is whole under its name at any time.
+        EXPECT_EQ(run({"verify", path("out.zarr")}).exit_code, 0) << at;
       }
-      EXPECT_GT(at, 20);
+      const Outcome outcome = run(convert("new.raw", again));
+      if (again == ways[2] && outcome.exit_code != 0) {
+        expect_refused(outcome, 2, {"out.zarr' exists"});
+        const bool goes_on = outcome.err.find("--resume --force goes on") != std::string::npos;
+        EXPECT_EQ(goes_on, fs::exists(path("out.zarr.partial/.isobrick-layout.json"))) << at;
+        succeeds(convert("new.raw", {"--resume", "--force"}), static_cast<int>(at));
+      } else {
+        EXPECT_EQ(outcome.exit_code, 0) << at << ": " << outcome.err;
+      }
+      EXPECT_TRUE(tree(path("out.zarr")) == expected) << at;
+      expect_only({"made of new.raw", "made of old.raw", "new.raw", "old.raw", "out.zarr"},
+                  static_cast<int>(at));
     }
+    EXPECT_GT(at, 20U);
+  }
 }
 
 TEST_F(Killed, AnIndexIsResumed) {

@@ -11,10 +11,7 @@
 
 namespace isobrick::inline v0 {
 
-// Libraries of formats that take longer to link than most commands take are known
-// only to modules, shared objects that are loaded when they are first needed. Each
-// has one function, isobrick_module(), that returns the address of one of these
-// structures. Every one begins with the version of isobrick that it belongs to.
+// What the modules of formats return (io/bytes/module.h).
 
 /// lib/isobrick/isobrick_hdf5.so
 struct Hdf5Module {
@@ -41,8 +38,7 @@ struct VdbModule {
                                                  int half_band, int threads, std::uint64_t budget);
 };
 
-// Each is loaded once. They throw Error when a module is not where it belongs or is
-// of another version.
+// Each is loaded once. They throw what load_module() does.
 const Hdf5Module& hdf5_module();
 const DicomModule& dicom_module();
 const VdbModule& vdb_module();

@@ -1,5 +1,6 @@
 #include "io/volumes/open/volume_format.h"
 
+#include <algorithm>
 #include <array>
 #include <filesystem>
 #include <optional>
@@ -11,6 +12,7 @@
 #include "io/bytes/file.h"
 #include "io/bytes/file_stream.h"
 #include "io/bytes/inflate_stream.h"
+#include "io/bytes/url.h"
 #include "io/bytes/zip_signature.h"
 #include "io/volumes/raw/nifti_header.h"
 #include "io/volumes/raw/text_header.h"
@@ -103,6 +105,7 @@ VolumeFormat recognise_format(const std::string& path) {
 }
 
 VolumePath split_volume_path(const std::string& path) {
+  if (is_url(path)) return {path, {}};
   const std::size_t colon = path.rfind(":/");
   std::error_code ignored;
   if (colon == std::string::npos || colon == 0 || std::filesystem::exists(path, ignored))
@@ -112,6 +115,7 @@ VolumePath split_volume_path(const std::string& path) {
 
 std::string volume_stem(const std::string& path) {
   std::string name = split_volume_path(path).file;
+  if (is_url(name)) name.erase(std::min(name.find_first_of("?#"), name.size()));
   while (name.size() > 1 && name.back() == '/') name.pop_back();
   std::error_code none;
   std::filesystem::path file = std::filesystem::path(name).filename();

@@ -1,0 +1,259 @@
+#include "bricks/storage/remote_storage.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <atomic>
+#include <charconv>
+#include <deque>
+#include <future>
+#include <mutex>
+#include <unordered_map>
+#include <utility>
+
+#include <isobrick/error.h>
+#include "bricks/storage/remote_object.h"
+#include "bricks/storage/remote_url.h"
+#include "bricks/storage/storage_keys.h"
+
+namespace isobrick::inline v0 {
+namespace {
+
+/// Bytes that come with the size of an object: all of metadata and of small chunks.
+constexpr std::uint64_t kHead = std::uint64_t{64} << 10;
+/// Objects whose size and state are remembered.
+constexpr std::size_t kMaxObjects = 10000;
+
+/// The number after the "/" of "bytes 0-99/1234", or nullopt.
+std::optional<std::uint64_t> total_size(const std::string& content_range) {
+  const std::size_t slash = content_range.find('/');
+  if (slash == content_range.npos) return std::nullopt;
+  std::uint64_t size = 0;
+  const char* const end = content_range.data() + content_range.size();
+  const auto [at, error] = std::from_chars(content_range.data() + slash + 1, end, size);
+  if (error != std::errc() || at != end) return std::nullopt;
+  return size;
+}
+
+std::string xml_decoded(std::string text) {
+  for (const auto& [entity, character] :
+       {std::pair("&lt;", "<"), std::pair("&gt;", ">"), std::pair("&quot;", "\""),
+        std::pair("&apos;", "'"), std::pair("&amp;", "&")})
+    for (std::size_t at = 0; (at = text.find(entity, at)) != text.npos; ++at)
+      text.replace(at, std::string_view(entity).size(), character);
+  return text;
+}
+
+class RemoteStorage final : public Storage, public std::enable_shared_from_this<RemoteStorage> {
+ public:
+  RemoteStorage(RemotePlace place, const RemoteOptions& options, std::shared_ptr<HttpClient> client)
+      : place_(std::move(place)),
+        client_(std::move(client)),
+        fetcher_(std::make_shared<RangeFetcher>(client_, options.memory)) {}
+
+  std::string name() const override { return place_.name; }
+  std::string name_of(const std::string& key) const override { return place_.name + '/' + key; }
+
+  std::shared_ptr<const StoredObject> open(const std::string& key) const override {
+    const Opened opened = begin_open(key);
+    try {
+      return opened.get();
+    } catch (const Error&) {
+      // The next call tries again.
+      const std::lock_guard lock(mutex_);
+      opened_.erase(key);
+      throw;
+    }
+  }
+
+  void will_open(const std::string& key) const override { begin_open(key); }
+  bool is_remote() const override { return true; }
+
+  std::vector<std::string> list(const std::string& folder) const override {
+    if (place_.list_url.empty()) return {};
+    const std::string prefix = place_.list_prefix + (folder.empty() ? "" : folder + '/');
+    std::vector<std::string> names;
+    std::string next;
+    do {
+      std::string url = place_.list_url + '?';
+      // In the order of the alphabet, as the signature wants them.
+      if (!next.empty()) url += "continuation-token=" + percent_encode(next, false) + '&';
+      url += "delimiter=%2F&list-type=2&prefix=" + percent_encode(prefix, false);
+      HttpReply reply = fetch(*client_, {.url = url});
+      if (reply.status != 200)
+        throw Error(
+            fmt::format("cannot list '{}': {}", name_of(folder), status_text(reply.status)));
+      S3Listing part = parse_s3_listing(
+          {reinterpret_cast<const char*>(reply.body.data()), reply.body.size()}, prefix);
+      std::move(part.names.begin(), part.names.end(), std::back_inserter(names));
+      next = std::move(part.next);
+    } while (!next.empty());
+    return names;
+  }
+
+  /// Whether the server refused to show an object, which then seems to be missing.
+  bool was_refused() const { return was_refused_; }
+
+ private:
+  using Object = std::shared_ptr<const RemoteObject>;
+  using Opened = std::shared_future<Object>;
+
+  std::string url_of(const std::string& key) const {
+    return place_.base + '/' + percent_encode(key, true) + place_.query;
+  }
+
+  Opened begin_open(const std::string& key) const {
+    const auto promise = std::make_shared<std::promise<Object>>();
+    const Opened opened = promise->get_future().share();
+    {
+      const std::lock_guard lock(mutex_);
+      const auto [found, is_new] = opened_.try_emplace(key, opened);
+      if (!is_new) return found->second;
+      keys_.push_back(key);
+      if (keys_.size() > kMaxObjects) {
+        opened_.erase(keys_.front());
+        keys_.pop_front();
+      }
+    }
+    HttpRequest request{.url = url_of(key), .range = ByteRange{0, kHead}, .max_body = kHead};
+    client_->send(std::move(request), [weak = weak_from_this(), promise, key](
+                                          HttpReply reply, const std::exception_ptr& error) {
+      const auto self = weak.lock();
+      try {
+        if (error) std::rethrow_exception(error);
+        promise->set_value(self ? self->object_of(key, std::move(reply)) : nullptr);
+      } catch (const Error&) {
+        promise->set_exception(std::current_exception());
+      }
+    });
+    return opened;
+  }
+
+  /// The object of a reply with its first bytes; null where there is none.
+  Object object_of(const std::string& key, HttpReply&& reply) const {
+    const std::string name = name_of(key);
+    const int status = reply.status;
+    if (status == 403) was_refused_ = true;
+    if (status == 403 || status == 404 || status == 410) return nullptr;
+    if (status == 301 && !reply.header("x-amz-bucket-region").empty())
+      throw Error(fmt::format("'{}' is in another region: set AWS_REGION={}", place_.name,
+                              reply.header("x-amz-bucket-region")));
+    std::optional<std::uint64_t> size;
+    if (status == 200) size = reply.body.size();
+    // No byte of an empty object can be requested.
+    if (status == 206 || status == 416) size = total_size(reply.header("content-range"));
+    if (status == 416 && size && *size > 0) size.reset();
+    if (status != 200 && status != 206 && status != 416)
+      throw Error(fmt::format("cannot read '{}': {}", name, status_text(status)));
+    if (!size)
+      throw Error(fmt::format("cannot read '{}': the server does not tell its size", name));
+    auto object = std::make_shared<const RemoteObject>(fetcher_, name, url_of(key), *size,
+                                                       reply.header("etag"));
+    if (status == 416) reply.body.clear();
+    fetcher_->keep(object, std::move(reply.body));
+    return object;
+  }
+
+  RemotePlace place_;
+  std::shared_ptr<HttpClient> client_;
+  std::shared_ptr<RangeFetcher> fetcher_;
+  mutable std::mutex mutex_;
+  mutable std::unordered_map<std::string, Opened> opened_;
+  mutable std::deque<std::string> keys_;  ///< of `opened_`, oldest first
+  mutable std::atomic<bool> was_refused_ = false;
+};
+
+/// What is between the tags of the next element of a name from `at` on, which moves behind it;
+/// nullopt: there is none.
+std::optional<std::string> next_element(const std::string& xml, std::string_view name,
+                                        std::size_t& at) {
+  const std::string open = fmt::format("<{}>", name), close = fmt::format("</{}>", name);
+  const std::size_t begin = xml.find(open, at);
+  if (begin == xml.npos) return std::nullopt;
+  const std::size_t end = xml.find(close, begin);
+  if (end == xml.npos) return std::nullopt;
+  at = end + close.size();
+  return xml.substr(begin + open.size(), end - begin - open.size());
+}
+
+/// A zip lies in a storage of its own folder, under its name.
+std::pair<std::string, std::string> split_last(const std::string& url) {
+  const std::size_t question = std::min(url.find('?'), url.size());
+  const std::size_t slash = url.rfind('/', question);
+  return {url.substr(0, slash) + url.substr(question), url.substr(slash + 1, question - slash - 1)};
+}
+
+HttpOptions http_options(const RemotePlace& place, const RemoteOptions& options) {
+  return {options.max_requests, options.tries, options.timeout_seconds, options.cancel, place.s3};
+}
+
+}  // namespace
+
+S3Listing parse_s3_listing(const std::string& xml, const std::string& prefix) {
+  if (xml.find("<ListBucketResult") == xml.npos)
+    throw Error("the server's list of objects is no ListBucketResult");
+  S3Listing listing;
+  for (const char* outer : {"Contents", "CommonPrefixes"})
+    for (std::size_t at = 0; const auto element = next_element(xml, outer, at);) {
+      std::size_t inner = 0;
+      auto key = next_element(*element, *outer == 'C' && outer[2] == 'n' ? "Key" : "Prefix", inner);
+      if (key) key = xml_decoded(std::move(*key));
+      if (!key || !key->starts_with(prefix)) continue;
+      key->erase(0, prefix.size());
+      while (key->ends_with('/')) key->pop_back();
+      if (!key->empty()) listing.names.push_back(std::move(*key));
+    }
+  std::size_t at = 0;
+  if (next_element(xml, "IsTruncated", at) == "true")
+    listing.next = xml_decoded(next_element(xml, "NextContinuationToken", at = 0).value_or(""));
+  return listing;
+}
+
+std::shared_ptr<const Storage> remote_storage(const std::string& url, const RemoteOptions& options,
+                                              std::shared_ptr<HttpClient> client) {
+  return std::make_shared<const RemoteStorage>(parse_remote_url(url, process_environment()),
+                                               options, std::move(client));
+}
+
+namespace {
+
+std::shared_ptr<const RemoteStorage> make_storage(const std::string& url,
+                                                  const RemoteOptions& options) {
+  if (!is_url(url)) throw UsageError(fmt::format("'{}' is no URL of http, https or s3", url));
+  if (options.max_requests < 1 || options.tries < 1 || !(options.timeout_seconds > 0))
+    throw UsageError("a remote storage needs a request, a try and a time at least");
+  RemotePlace place = parse_remote_url(url, process_environment());
+  std::shared_ptr<HttpClient> client = make_http_client(http_options(place, options));
+  return std::make_shared<const RemoteStorage>(std::move(place), options, std::move(client));
+}
+
+}  // namespace
+
+std::shared_ptr<const Storage> remote_storage(const std::string& url,
+                                              const RemoteOptions& options) {
+  return make_storage(url, options);
+}
+
+std::shared_ptr<const Storage> open_remote_storage(const std::string& url) {
+  const auto [folder, name] = split_last(url);
+  if (name.ends_with(".zip") || name.ends_with(".ozx")) {
+    const auto object = make_storage(folder, {})->open(name);
+    if (!object) throw Error(fmt::format("'{}' does not exist", url));
+    return zip_storage(object);
+  }
+  const auto storage = make_storage(url, {});
+  for (const char* key : kZarrFiles) storage->will_open(key);
+  const auto is_there = [&](const char* key) { return storage->open(key) != nullptr; };
+  if (std::ranges::any_of(kZarrFiles, is_there)) return storage;
+  if (storage->was_refused())
+    throw Error(fmt::format(
+        "cannot read '{}': the server refuses it (403 Forbidden), or there is no store; "
+        "check the name and the credentials",
+        storage->name()));
+  throw Error(
+      fmt::format("'{}' is no store: it has no zarr.json and no .zattrs; of URLs only stores "
+                  "and zips of them are read",
+                  storage->name()));
+}
+
+}  // namespace isobrick

@@ -1,0 +1,132 @@
+"""A server of the files in a folder, with faults: http_server.py FOLDER [PORT_FILE].
+
+Prints its port. The first part of a path names what is wrong with it:
+
+    /plain/…            nothing
+    /slow:MS/…          a pause before each reply
+    /link:MBPS:MS/…     a link of so many MB/s that all replies share, and a pause
+    /fail:STATUS:N/…    the first N requests of each object and range get this status
+    /reset:N/…          … or end without a reply
+    /short:N/…          … or end in the middle of the body
+    /wrong:N/…          … or have the bytes of another range
+    /hang:N/…           … or never get a reply
+    /noranges/…         answers as if no range was requested
+    /forbidden/…        403 for what is missing
+    /changing/…         another ETag at each reply
+    /secret/…           403 without "?token=abc"
+
+GET /requests returns how many there were, and how many bytes were sent; GET /reset sets both to 0.
+"""
+
+import asyncio
+import hashlib
+import os
+import sys
+import time
+from urllib.parse import unquote, urlsplit
+
+REASONS = {200: "OK", 206: "Partial Content", 403: "Forbidden", 404: "Not Found", 412: "Changed",
+           416: "Range Not Satisfiable", 429: "Too Many Requests", 500: "Error",
+           503: "Service Unavailable"}
+
+
+class Server:
+    def __init__(self, folder):
+        self.folder = folder
+        self.seen = {}
+        self.requests = self.bytes = self.changes = 0
+        self.link_free = 0.0
+
+    async def run(self, reader, writer):
+        try:
+            while await self.reply(reader, writer):
+                pass
+        except (ConnectionError, asyncio.IncompleteReadError):
+            pass
+        finally:
+            writer.close()
+
+    async def reply(self, reader, writer):
+        line = (await reader.readline()).decode("latin-1").split()
+        if len(line) < 2:
+            return False
+        headers = {}
+        while (header := (await reader.readline()).strip()):
+            name, _, value = header.decode("latin-1").partition(":")
+            headers[name.lower()] = value.strip()
+        parts = urlsplit(line[1])
+        path = unquote(parts.path).strip("/")
+        if path in ("requests", "reset"):
+            if path == "reset":
+                self.requests = self.bytes = 0
+            return await self.send(writer, 200, f"{self.requests} {self.bytes}".encode())
+        self.requests += 1
+        mode, _, name = path.partition("/")
+        mode, *numbers = mode.split(":")
+        return await self.answer(writer, mode, [int(n) for n in numbers], name, headers, parts.query)
+
+    async def answer(self, writer, mode, numbers, name, headers, query):
+        if os.environ.get("HTTP_LOG"):
+            print("%.3f" % time.monotonic(), name, headers.get("range"), file=sys.stderr, flush=True)
+        tries = self.seen.get((mode, name, headers.get("range")), 0) + 1
+        self.seen[mode, name, headers.get("range")] = tries
+        fails = mode in ("fail", "reset", "short", "wrong", "hang") and tries <= numbers[-1]
+        if mode == "slow":
+            await asyncio.sleep(numbers[0] / 1000)
+        if mode == "fail" and fails:
+            return await self.send(writer, numbers[0], b"<Code>Slow</Code><Message>down</Message>")
+        if mode == "hang" and fails:
+            await asyncio.sleep(3600)
+        if mode == "reset" and fails:
+            writer.transport.abort()
+            return False
+        if mode == "secret" and query != "token=abc":
+            return await self.send(writer, 403)
+        file = os.path.join(self.folder, name)
+        if not os.path.isfile(file):
+            return await self.send(writer, 403 if mode == "forbidden" else 404)
+        with open(file, "rb") as opened:
+            data = opened.read()
+        self.changes += mode == "changing"
+        tag = '"%s%s"' % (hashlib.md5(data).hexdigest(), self.changes or "")
+        if headers.get("if-match", tag) != tag:
+            return await self.send(writer, 412)
+        more, status = [f"ETag: {tag}"], 200
+        if "range" in headers and mode != "noranges":
+            first, _, last = headers["range"].removeprefix("bytes=").partition("-")
+            first, last = int(first), min(int(last), len(data) - 1)
+            if first >= len(data):
+                return await self.send(writer, 416, b"", [f"Content-Range: bytes */{len(data)}"])
+            more.append(f"Content-Range: bytes {first}-{last}/{len(data)}")
+            at = 1 if mode == "wrong" and fails else 0
+            if at:
+                more[-1] = f"Content-Range: bytes {first + 1}-{last + 1}/{len(data)}"
+            data, status = data[first + at:last + 1], 206
+        if mode == "link":
+            # All replies go through one link, one after another.
+            now = time.monotonic()
+            self.link_free = max(self.link_free, now) + len(data) / (numbers[0] * 1e6)
+            await asyncio.sleep(self.link_free - now + numbers[1] / 1000)
+        if mode == "short" and fails and data:
+            await self.send(writer, status, data, more, len(data) // 2)
+            return False
+        return await self.send(writer, status, data, more)
+
+    async def send(self, writer, status, data=b"", more=(), count=None):
+        head = [f"HTTP/1.1 {status} {REASONS[status]}", f"Content-Length: {len(data)}", *more]
+        data = data[:count]
+        self.bytes += len(data)
+        writer.write("\r\n".join(head).encode() + b"\r\n\r\n" + data)
+        await writer.drain()
+        return True
+
+
+async def main():
+    server = Server(sys.argv[1])
+    listening = await asyncio.start_server(server.run, "127.0.0.1", 0, limit=1 << 20)
+    print(listening.sockets[0].getsockname()[1], flush=True)
+    async with listening:
+        await listening.serve_forever()
+
+
+asyncio.run(main())

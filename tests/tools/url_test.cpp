@@ -1,0 +1,136 @@
+#include <csignal>
+#include <cstdlib>
+#include <memory>
+
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <fmt/format.h>
+
+#include "tests/tools/program.h"
+
+namespace isobrick::test {
+namespace {
+
+/// http_server.py, which serves a folder while the test runs.
+class Server {
+ public:
+  explicit Server(const std::string& folder) {
+    int ends[2];
+    if (::pipe(ends) != 0) return;
+    process_ = ::fork();
+    if (process_ == 0) {
+      ::dup2(ends[1], STDOUT_FILENO);
+      ::close(ends[0]);
+      ::execlp("python3", "python3", ISOBRICK_SOURCE "/tests/tools/http_server.py", folder.c_str(),
+               nullptr);
+      ::_exit(127);
+    }
+    ::close(ends[1]);
+    std::string text;
+    for (char c = 0; ::read(ends[0], &c, 1) == 1 && c != '\n';) text += c;
+    ::close(ends[0]);
+    port_ = std::atoi(text.c_str());
+  }
+  ~Server() {
+    if (process_ <= 0) return;
+    ::kill(process_, SIGKILL);
+    ::waitpid(process_, nullptr, 0);
+  }
+  Server(const Server&) = delete;
+  Server& operator=(const Server&) = delete;
+
+  int port() const { return port_; }
+
+ private:
+  pid_t process_ = -1;
+  int port_ = 0;
+};
+
+class Url : public ProgramTest {
+ protected:
+  void SetUp() override {
+    if (!available("python3")) GTEST_SKIP() << "python3 is not there";
+    // Of several shards, so that there are several objects.
+    store_ = path("smooth.zarr");
+    ASSERT_EQ(run({"synth", "gyroid", store_, "--dims", "130,96,90", "--type", "u8", "--brick", "16",
+                   "--shard", "64"})
+                  .exit_code,
+              0);
+    server_ = std::make_unique<Server>(path(""));
+    ASSERT_GT(server_->port(), 0);
+    expected_ = mesh_of(store_);
+  }
+
+  std::string url(const std::string& mode, const std::string& name = "smooth.zarr") const {
+    return fmt::format("http://127.0.0.1:{}/{}/{}", server_->port(), mode, name);
+  }
+  Outcome extract(const std::string& input, const std::vector<std::string>& more = {}) {
+    Arguments arguments{"extract", input, "--isovalue", "127.5", "-o", path("m.ply"), "-f", "-q"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return run(arguments);
+  }
+  std::string mesh_of(const std::string& input, const std::vector<std::string>& more = {}) {
+    const Outcome outcome = extract(input, more);
+    EXPECT_EQ(outcome.exit_code, 0) << input << ": " << outcome.err;
+    return outcome.exit_code == 0 ? read_file(path("m.ply")) : "";
+  }
+
+  std::string store_, expected_;
+  std::unique_ptr<Server> server_;
+};
+
+TEST_F(Url, MeshesAreThoseOfTheFolder) {
+  for (const char* mode : {"plain", "slow:20", "link:20:5", "forbidden"})
+    EXPECT_TRUE(mesh_of(url(mode)) == expected_) << mode;
+  EXPECT_TRUE(mesh_of(url("plain") + "/") == expected_);
+  EXPECT_TRUE(mesh_of(url("secret") + "?token=abc") == expected_);
+  for (const char* threads : {"1", "3"})
+    EXPECT_TRUE(mesh_of(url("plain"), {"--threads", threads, "--memory", "64M"}) == expected_);
+}
+
+TEST_F(Url, FailuresForAWhileDoNotMatter) {
+  for (const char* mode : {"fail:503:1", "fail:429:1", "fail:500:2", "reset:1", "short:1"})
+    EXPECT_TRUE(mesh_of(url(mode)) == expected_) << mode;
+}
+
+TEST_F(Url, FailuresThatStayEndWithALine) {
+  expect_refused(extract(url("wrong:99")), 1, {"smooth.zarr/", "in place of"});
+  expect_refused(extract(url("noranges")), 1, {"ranges of bytes"});
+  expect_refused(extract(url("changing")), 1, {"changed", "open the store anew"});
+  expect_refused(extract(url("secret")), 1, {"403 Forbidden", "credentials"});
+  expect_refused(extract(url("plain", "nothing.zarr")), 1, {"nothing.zarr' is no store"});
+  expect_refused(extract("http://127.0.0.1:1/a.zarr"), 1, {"127.0.0.1:1/a.zarr", "3 tries"});
+  expect_refused(extract("https://"), 2, {"names no host"});
+  EXPECT_EQ(files(), (std::vector<std::string>{"m.ply", "smooth.zarr"}));
+}
+
+TEST_F(Url, ZipsAreReadToo) {
+  ASSERT_EQ(run({"export", store_, path("smooth.zarr.zip")}).exit_code, 0);
+  EXPECT_TRUE(mesh_of(url("plain", "smooth.zarr.zip")) == expected_);
+  expect_refused(extract(url("plain", "other.zip")), 1, {"other.zip' does not exist"});
+}
+
+TEST_F(Url, EveryReadingCommandTakesThem) {
+  const nlohmann::json info = run_json({"info", url("plain")});
+  EXPECT_EQ(info.at("extent"), run_json({"info", store_}).at("extent"));
+  EXPECT_EQ(run({"verify", url("plain")}).exit_code, 0);
+  ASSERT_EQ(run({"convert", url("plain"), path("copy.zarr"), "--brick", "32"}).exit_code, 0);
+  EXPECT_TRUE(mesh_of(path("copy.zarr")) == expected_);
+  ASSERT_EQ(run({"export", url("plain"), path("a.raw")}).exit_code, 0);
+  ASSERT_EQ(run({"export", store_, path("b.raw")}).exit_code, 0);
+  EXPECT_TRUE(read_file(path("a.raw")) == read_file(path("b.raw")));
+  // The spacing of the request is that of a store made for it.
+  EXPECT_TRUE(mesh_of(url("plain"), {"--spacing", "2,3,4"}) ==
+              mesh_of(store_, {"--spacing", "2,3,4"}));
+}
+
+TEST_F(Url, NothingIsWrittenToOne) {
+  expect_refused(run({"extract", store_, "--isovalue", "1", "-o", url("plain", "m.ply")}), 2,
+                 {"m.ply': nothing can be written to a URL"});
+  expect_refused(run({"convert", store_, url("plain", "c.zarr")}), 2, {"c.zarr': nothing can be"});
+  expect_refused(run({"index", url("plain"), "--kind", "octree"}), 2, {"isobrick convert"});
+}
+
+}  // namespace
+}  // namespace isobrick::test
