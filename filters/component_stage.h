@@ -26,7 +26,7 @@ class ComponentStage final : public FilterStage {
   void finish() override;
 
  private:
-  /// Of the components as large as the smallest that stays, the first `equal` stay.
+  /// Of the components as large as the smallest one kept, the first `equal` are kept.
   struct Threshold {
     std::uint64_t triangles = 0, equal = 0;
   };

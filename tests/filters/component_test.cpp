@@ -37,7 +37,7 @@ TEST(Components, BelowTheMinimumAreDropped) {
   }
 }
 
-// The lattice of balls has many of one size, so ties decide.
+// The lattice of balls has many of one size, so the first vertex decides.
 TEST(Components, WithMostTrianglesAreKept) {
   const Mesh mesh = debris();
   for (const std::size_t count : {1, 2, 3, 17, 100, 100000}) {
