@@ -70,7 +70,7 @@ void check_numbers(const Mesh& mesh) {
 
 }  // namespace
 
-void check(const MeshFilterOptions& options) {
+void check_filters(const MeshFilterOptions& options) {
   if (options.min_component > 0 && options.largest > 0)
     throw UsageError(
         "components are chosen by the triangles that each needs or as the largest ones: give one "
@@ -83,7 +83,8 @@ void check(const MeshFilterOptions& options) {
                                  kMaxPassBand, options.pass_band));
 }
 
-std::uint64_t scratch_bytes(const MeshFilterOptions& options, MeshSize mesh, bool has_normals) {
+std::uint64_t filter_scratch_bytes(const MeshFilterOptions& options, MeshSize mesh,
+                                   bool has_normals) {
   const std::uint64_t v = mesh.vertices, triangles = mesh.triangles * sizeof(Triangle);
   const std::uint64_t row = (has_normals ? 2 : 1) * sizeof(Vec3f);
   std::uint64_t bytes = 0;
@@ -99,7 +100,7 @@ class MeshFilter::Stages {
  public:
   Stages(MeshSink& sink, const MeshFilterOptions& options)
       : place_{.beside = options.scratch_beside.string()}, cancel_(options.cancel), first_(&sink) {
-    check(options);
+    check_filters(options);
     const bool unwelds = options.any() && sink.indexing() == Indexing::chunk_local;
     const int shares = int{unwelds} + int{options.measure} + int{options.smooth > 0} +
                        int{chooses_components(options)};

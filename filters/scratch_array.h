@@ -28,8 +28,8 @@ class ScratchArray {
                1),
         pages_(place, sizeof(T) << shift_,
                static_cast<std::size_t>(memory / (sizeof(T) << shift_))) {}
-  ScratchArray(ScratchArray&&) = default;
-  ScratchArray& operator=(ScratchArray&&) = default;
+  ScratchArray(ScratchArray&&) noexcept = default;
+  ScratchArray& operator=(ScratchArray&&) noexcept = default;
 
   std::uint64_t size() const { return size_; }
   bool empty() const { return size_ == 0; }

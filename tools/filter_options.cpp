@@ -28,7 +28,7 @@ void check_filters(const FilterArguments& filters, bool estimates) {
     throw UsageError("--pass-band is for --smooth: add --smooth N");
   if (filters.measure && estimates)
     throw UsageError("--measure needs the mesh, which --estimate does not make: leave out one");
-  check(filter_options(filters));
+  isobrick::check_filters(filter_options(filters));
 }
 
 MeshFilterOptions filter_options(const FilterArguments& filters) {

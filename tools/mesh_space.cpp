@@ -68,7 +68,7 @@ std::optional<Shortage> find_shortage(
                         enlarged(mesh.size.triangles, mesh.uncertainty)};
     const MeshBytes bytes = predict_bytes(mesh.form, size);
     const std::uint64_t needed =
-        finished + bytes.needed + scratch_bytes(mesh.filter, size, mesh.form.normals);
+        finished + bytes.needed + filter_scratch_bytes(mesh.filter, size, mesh.form.normals);
     const std::uint64_t free = free_space(mesh.path);
     if (needed > free) return Shortage{i, needed, free};
     finished += bytes.file;

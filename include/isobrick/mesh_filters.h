@@ -63,11 +63,11 @@ struct MeshFilterOptions {
 };
 
 /// Throws UsageError for options that make no sense.
-ISOBRICK_API void check(const MeshFilterOptions& options);
+ISOBRICK_API void check_filters(const MeshFilterOptions& options);
 
 /// Bytes that scratch files take at most for a mesh of this size.
-ISOBRICK_API std::uint64_t scratch_bytes(const MeshFilterOptions& options, MeshSize mesh,
-                                         bool has_normals);
+ISOBRICK_API std::uint64_t filter_scratch_bytes(const MeshFilterOptions& options, MeshSize mesh,
+                                                bool has_normals);
 
 /// Passes a mesh on to another sink, filtered, whatever its size: see MeshFilterOptions::memory.
 /// The mesh that leaves depends on nothing but the mesh that enters and the options, not on its
@@ -76,7 +76,7 @@ ISOBRICK_API std::uint64_t scratch_bytes(const MeshFilterOptions& options, MeshS
 /// Filters that change the mesh write to the sink when the whole mesh is there, in finish().
 class ISOBRICK_API MeshFilter final : public MeshSink {
  public:
-  /// `sink` must outlive it. Throws as check() does.
+  /// `sink` must outlive it. Throws as check_filters() does.
   MeshFilter(MeshSink& sink, const MeshFilterOptions& options);
   ~MeshFilter() override;
 

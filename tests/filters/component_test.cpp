@@ -25,7 +25,7 @@ bool is_largest(const Sizes& sizes, std::uint32_t root, std::size_t count) {
 
 TEST(Components, BelowTheMinimumAreDropped) {
   const Mesh mesh = debris(true);
-  for (const std::uint64_t min : {2, 60, 150, 1 << 20}) {
+  for (const std::uint64_t min : {2u, 60u, 150u, 1u << 20}) {
     const Mesh expected = kept_components(mesh, [&](const Sizes& sizes, std::uint32_t root) {
       return is_at_least(sizes, root, min);
     });
@@ -40,7 +40,7 @@ TEST(Components, BelowTheMinimumAreDropped) {
 // The lattice of balls has many of one size, so the first vertex decides.
 TEST(Components, WithMostTrianglesAreKept) {
   const Mesh mesh = debris();
-  for (const std::size_t count : {1, 2, 3, 17, 100, 100000}) {
+  for (const std::size_t count : {1u, 2u, 3u, 17u, 100u, 100000u}) {
     const Mesh expected = kept_components(mesh, [&](const Sizes& sizes, std::uint32_t root) {
       return is_largest(sizes, root, count);
     });
@@ -77,8 +77,8 @@ TEST(Components, DependOnNeitherChunksNorMemory) {
        {MeshFilterOptions{.min_component = 80}, MeshFilterOptions{.largest = 20}}) {
     const Mesh expected = filtered(mesh, request).mesh;
     ASSERT_FALSE(expected.triangles.empty());
-    for (const std::uint64_t memory : {0, 1 << 20})
-      for (const std::size_t chunk : {5, 777}) {
+    for (const std::uint64_t memory : {0u, 1u << 20})
+      for (const std::size_t chunk : {5u, 777u}) {
         MeshFilterOptions options = request;
         options.memory = memory;
         EXPECT_TRUE(same(filtered(mesh, options, chunk).mesh, expected));
@@ -135,7 +135,7 @@ TEST(MeshFilter, WithNothingToDoPassesChunksOn) {
 TEST(MeshFilter, WritesToSinksOfUnweldedChunks) {
   const Mesh mesh = debris(true);
   const Mesh expected = filtered(mesh, {.largest = 40}).mesh;
-  for (const std::uint64_t memory : {0, 1 << 26}) {
+  for (const std::uint64_t memory : {0u, 1u << 26}) {
     std::vector<Vec3f> corners, normals;
     std::uint64_t vertices = 0;
     FunctionSink sink(

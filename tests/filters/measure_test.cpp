@@ -162,8 +162,8 @@ void expect_equal(const MeshMeasure& a, const MeshMeasure& b) {
 TEST(Measure, DependsOnNeitherChunksNorMemory) {
   for (const Mesh& mesh : {debris(), sphere(50)}) {
     const MeshMeasure expected = measure(mesh);
-    for (const std::uint64_t memory : {0, 1 << 20, 1 << 28})
-      for (const std::size_t chunk : {7, 1000, 1 << 20}) {
+    for (const std::uint64_t memory : {0u, 1u << 20, 1u << 28})
+      for (const std::size_t chunk : {7u, 1000u, 1u << 20}) {
         const Filtered result = filtered(mesh, {.measure = true, .memory = memory}, chunk);
         expect_equal(*result.measure, expected);
         EXPECT_TRUE(same(result.mesh, mesh)) << "the mesh changed on its way";

@@ -32,7 +32,7 @@ void expect_equal(const Mesh& a, const Mesh& b) {
 
 TEST(MeshSpool, ReplaysWhatItTook) {
   const Mesh mesh = strip(5000);
-  for (const std::uint64_t memory : {0, 1 << 12, 1 << 24}) {
+  for (const std::uint64_t memory : {0u, 1u << 12, 1u << 24}) {
     MeshSpool spool({.page_bytes = 256}, memory);
     spool.begin({.has_normals = true});
     spool.append({0, mesh.positions.span().first(100), mesh.normals.span().first(100),

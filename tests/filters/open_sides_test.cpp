@@ -53,7 +53,7 @@ TEST(OpenSides, AreCountedExactlyWhereTheTableIsSmall) {
     if (is_open) mesh.triangles.resize(mesh.triangles.size() / 3 * 2);
     const std::uint64_t expected = open_sides_of(mesh);
     EXPECT_EQ(expected > 0, is_open);
-    for (const std::uint64_t memory : {1 << 8, 1 << 11, 1 << 24}) {
+    for (const std::uint64_t memory : {1u << 8, 1u << 11, 1u << 24}) {
       OpenSides sides({.page_bytes = 256}, memory);
       for (const Triangle& t : mesh.triangles) sides.add(t);
       EXPECT_EQ(count_open(sides), expected) << memory;

@@ -1,8 +1,12 @@
 #include "filters/scratch_array.h"
 
+#include <sys/resource.h>
+
+#include <csignal>
 #include <cstdint>
-#include <fstream>
+#include <filesystem>
 #include <random>
+#include <string>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -30,7 +34,7 @@ std::vector<std::uint32_t> all_of(Numbers& numbers) {
 
 // Random reads, writes and appends do what they do to a vector, whatever is resident.
 TEST(ScratchArray, IsAVectorWithAnyBudget) {
-  for (const std::uint64_t memory : {0, 64, 128, 1024, 1 << 20}) {
+  for (const std::uint64_t memory : {0u, 64u, 128u, 1024u, 1u << 20}) {
     Numbers numbers(small_pages(), memory);
     std::vector<std::uint32_t> expected;
     std::mt19937 engine(7);
@@ -130,6 +134,31 @@ TEST(ScratchArray, NamesAFolderThatCannotBeWrittenTo) {
     EXPECT_NE(std::string(error.what()).find("/no such folder"), std::string::npos) << error.what();
     EXPECT_EQ(std::string(error.what()).find('\n'), std::string::npos);
   }
+}
+
+// A limit on the size of files stands for a disk that is full.
+TEST(ScratchArray, ReportsADiskThatIsFull) {
+  const TemporaryFolder folder;
+  rlimit before{};
+  ASSERT_EQ(::getrlimit(RLIMIT_FSIZE, &before), 0);
+  const auto handler = std::signal(SIGXFSZ, SIG_IGN);
+  const rlimit small{std::size_t{16} << 10, before.rlim_max};
+  ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &small), 0);
+  std::string message;
+  {
+    Numbers numbers({.beside = (folder / "mesh.ply").string(), .page_bytes = 64}, 64);
+    try {
+      for (std::uint32_t i = 0; i < 100000; ++i) numbers.push_back(i);
+    } catch (const Error& error) {
+      message = error.what();
+    }
+  }
+  ::setrlimit(RLIMIT_FSIZE, &before);
+  std::signal(SIGXFSZ, handler);
+  EXPECT_NE(message.find("cannot write '" + (folder / "mesh.ply").string() + "': "),
+            std::string::npos)
+      << message;
+  EXPECT_TRUE(std::filesystem::is_empty(folder / ""));
 }
 
 }  // namespace

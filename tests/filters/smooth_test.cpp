@@ -137,8 +137,8 @@ TEST(Smooth, MakesNormalsOfTheTriangles) {
 TEST(Smooth, DependsOnNeitherChunksNorMemory) {
   const Mesh mesh = debris(true);
   const Mesh expected = filtered(mesh, {.smooth = 4}).mesh;
-  for (const std::uint64_t memory : {0, 1 << 20})
-    for (const std::size_t chunk : {9, 1234})
+  for (const std::uint64_t memory : {0u, 1u << 20})
+    for (const std::size_t chunk : {9u, 1234u})
       EXPECT_TRUE(same(filtered(mesh, {.smooth = 4, .memory = memory}, chunk).mesh, expected));
 }
 
