@@ -110,7 +110,8 @@ class MeshFilter::Stages {
     count_ = &add<CountStage>(first_->indexing());
     if (options.measure) measure_ = &add<MeasureStage>(place_, memory_);
     if (options.smooth > 0)
-      add<SmoothStage>(place_, memory_, Smoothing{options.smooth, options.pass_band});
+      add<SmoothStage>(place_, memory_,
+                       Smoothing{options.smooth, options.pass_band, options.progress});
     if (chooses_components(options))
       add<ComponentStage>(place_, memory_, ComponentChoice{options.min_component, options.largest});
   }

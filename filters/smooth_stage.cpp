@@ -55,6 +55,7 @@ void SmoothStage::add_differences() {
       add(t[1], bc - ab);
       add(t[2], ca - bc);
     }
+    progress().advance(run.size_bytes());
   });
 }
 
@@ -104,12 +105,15 @@ void SmoothStage::write_vertices() {
 void SmoothStage::finish() {
   fix_borders();
   const double mu = 1 / (smoothing_.pass_band - 1 / kLambda);
+  progress().begin("smoothing", 2 * static_cast<std::uint64_t>(smoothing_.iterations) *
+                                    triangles_.size() * sizeof(Triangle));
   for (int i = 0; i < smoothing_.iterations; ++i) {
     for (const double fraction : {kLambda, mu}) {
       add_differences();
       move(fraction);
     }
   }
+  progress().end();
   if (has_normals_) add_normals();
   const std::uint64_t vertices = vertices_.size();
   write_vertices();

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 
+#include <isobrick/progress.h>
 #include "filters/filter_stage.h"
 #include "filters/open_sides.h"
 #include "filters/scratch_array.h"
@@ -12,6 +13,7 @@ namespace isobrick::inline v0 {
 struct Smoothing {
   int iterations = 0;
   double pass_band = 0.1;
+  Progress* progress = nullptr;  ///< null: nobody hears of the iterations
 };
 
 /// Passes a smoothed mesh on: Taubin, A signal processing approach to fair surface design, 1995.
@@ -49,6 +51,7 @@ class SmoothStage final : public FilterStage {
   std::uint64_t own_memory() const override {
     return vertices_.memory() + normals_.memory() + triangles_.memory() + sides_.memory();
   }
+  Progress& progress() { return smoothing_.progress ? *smoothing_.progress : no_progress(); }
   void fix_borders();
   void add_differences();
   void move(double fraction);

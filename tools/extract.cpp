@@ -45,7 +45,7 @@ std::unique_ptr<MeshFilter> filter_before(MeshSink* sink, MeshFilterOptions opti
 /// Opens every output before the first extraction, so that one that exists or
 /// cannot be written stops the command at once.
 std::vector<Sinks> open_sinks(const std::vector<ExtractedSurface>& surfaces,
-                              const ExtractArguments& arguments) {
+                              const ExtractArguments& arguments, Progress& progress) {
   const bool force = arguments.force;
   const std::array<fs::path, 1> inputs{arguments.input.path};
   std::vector<Sinks> sinks;
@@ -63,6 +63,8 @@ std::vector<Sinks> open_sinks(const std::vector<ExtractedSurface>& surfaces,
     if (!surface.preview.empty())
       of_surface.preview = open_preview(surface.preview.string(), force, arguments.preview);
     MeshFilterOptions filter = surface.filter;
+    // Several may be finished at the same time.
+    if (surfaces.size() * arguments.outputs() == 1) filter.progress = &progress;
     of_surface.mesh_filter = filter_before(of_surface.mesh.get(), filter, surface.output);
     filter.measure = filter.measure && !of_surface.mesh;  // once is enough
     of_surface.preview_filter = filter_before(of_surface.preview.get(), filter, surface.preview);
@@ -151,7 +153,7 @@ CommandOutput make_all(const ExtractArguments& arguments,
                        Console& console) {
   check_pictures(surfaces, arguments, store);
   if (!arguments.no_space_check) check_space(surfaces, store);
-  const std::vector<Sinks> sinks = open_sinks(surfaces, arguments);
+  const std::vector<Sinks> sinks = open_sinks(surfaces, arguments, console.progress());
   const SurfaceReports made = make(surfaces, sinks, store, console);
   CommandOutput result;
   for (std::size_t i = 0; i < surfaces.size(); ++i) {

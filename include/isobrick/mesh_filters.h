@@ -55,6 +55,10 @@ struct MeshFilterOptions {
   std::filesystem::path scratch_beside = "-";
   /// Ends the operation with Cancelled, soon after a stop is requested on any thread.
   std::stop_token cancel = {};
+  /// Hears of what takes long in finish(), within the stage of the extraction. It must outlive the
+  /// filter and is called by the thread that calls finish(). Null: nobody. Not for filters that
+  /// several threads may finish, as one extraction of several surfaces does.
+  Progress* progress = nullptr;
 
   /// Whether the mesh that leaves may be another one than that which enters.
   bool changes_mesh() const { return min_component > 1 || largest > 0 || smooth > 0; }

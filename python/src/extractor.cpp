@@ -43,7 +43,7 @@ class ArrayExtractor {
         return;
       }
       MemorySink sink(*mesh);
-      MeshFilter filter(sink, within_budget(filters, options.memory, 1, "-", reporter.cancel));
+      MeshFilter filter(sink, within_budget(filters, options.memory, 1, "-", reporter));
       extractor_.extract(options, filter, reporter.progress);
     });
     return mesh;
@@ -75,7 +75,7 @@ class ArrayExtractor {
       options.cancel = reporter.cancel;
       sink = create_mesh_file(path, file);
       filter = std::make_unique<MeshFilter>(
-          *sink, within_budget(filters, options.memory, 1, path, reporter.cancel));
+          *sink, within_budget(filters, options.memory, 1, path, reporter));
       extractor_.extract(options, *filter, reporter.progress);
     });
     py::dict report;

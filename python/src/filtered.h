@@ -4,12 +4,12 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <stop_token>
 #include <string>
 #include <utility>
 
 #include <isobrick/mesh_filters.h>
 #include "python/src/casters.h"
+#include "python/src/interruptible.h"
 
 namespace isobrick::python {
 
@@ -30,11 +30,12 @@ inline pybind11::dict describe(const MeshMeasure& m) {
 /// `path`.
 inline MeshFilterOptions within_budget(MeshFilterOptions filters, std::uint64_t memory,
                                        std::size_t meshes, const std::string& path,
-                                       std::stop_token cancel) {
+                                       const Reporter& reporter) {
   constexpr std::uint64_t least = std::uint64_t{8} << 20;
   filters.memory = std::max(least, memory / 4 / std::max<std::size_t>(1, meshes));
   filters.scratch_beside = path;
-  filters.cancel = std::move(cancel);
+  filters.cancel = reporter.cancel;
+  if (meshes == 1) filters.progress = &reporter.progress;
   return filters;
 }
 

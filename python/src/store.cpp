@@ -62,7 +62,7 @@ std::vector<std::unique_ptr<Mesh>> extract_meshes(const OpenedVolume& volume,
     std::vector<std::unique_ptr<MeshSink>> sinks, filtered;
     std::vector<SurfaceOutput> outputs;
     const MeshFilterOptions filter =
-        within_budget(filters, options.memory, isovalues.size(), "-", reporter.cancel);
+        within_budget(filters, options.memory, isovalues.size(), "-", reporter);
     for (const double isovalue : isovalues) {
       meshes.push_back(std::make_unique<Mesh>());
       sinks.push_back(std::make_unique<MemorySink>(*meshes.back()));
@@ -104,7 +104,7 @@ py::dict save_mesh(const OpenedVolume& volume, ExtractOptions options,
     options.cancel = reporter.cancel;
     sink = create_mesh_file(path, file);
     filter = std::make_unique<MeshFilter>(
-        *sink, within_budget(filters, options.memory, 1, path, reporter.cancel));
+        *sink, within_budget(filters, options.memory, 1, path, reporter));
     return extract(volume.store(), options, *filter, reporter.progress);
   });
   py::dict result(py::arg("vertices") = report.vertices, py::arg("faces") = report.triangles,

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <isobrick/progress.h>
 #include "core/vectors.h"
 #include "filters/smooth_stage.h"
 #include "tests/filters/filter_fixture.h"
@@ -151,6 +152,22 @@ TEST(Smooth, NeedsFewPages) {
   EXPECT_LE(stage.memory(), 16u << 10);
   write_chunks(mesh, stage, 50);
   EXPECT_TRUE(same(result, expected));
+}
+
+TEST(Smooth, ReportsItsIterations) {
+  struct Counts final : Progress {
+    void begin(std::string_view stage, std::uint64_t total) override {
+      EXPECT_EQ(stage, "smoothing");
+      left = total;
+    }
+    void advance(std::uint64_t done) override { left -= done; }
+    void end() override { ended = true; }
+    std::uint64_t left = 0;
+    bool ended = false;
+  } counts;
+  (void)filtered(sphere(20), {.smooth = 7, .progress = &counts});
+  EXPECT_EQ(counts.left, 0u);
+  EXPECT_TRUE(counts.ended);
 }
 
 TEST(Smooth, OfAnEmptyMeshAndALoneVertex) {
