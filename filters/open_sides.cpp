@@ -63,8 +63,6 @@ void OpenSides::make_table(std::size_t size) {
 }
 
 void OpenSides::add_side(std::uint32_t from, std::uint32_t to) {
-  if (from == to) return;
-  ++added_;
   const bool ascends = from < to;
   const std::uint64_t key =
       std::uint64_t{ascends ? from : to} << 32 | std::uint64_t{ascends ? to : from};
@@ -146,6 +144,7 @@ void OpenSides::merge_runs(const std::function<void(const Side&)>& f) {
 }
 
 void OpenSides::for_each(const std::function<void(const Side&)>& f) {
+  add_last();
   if (waiting_ > 0) spill();
   merge_runs(f);
 }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <functional>
 #include <vector>
@@ -31,9 +32,17 @@ class OpenSides {
 
   /// Adds the three sides of a triangle. One between equal vertices is none.
   void add(const Triangle& t) {
-    add_side(t[0], t[1]);
-    add_side(t[1], t[2]);
-    add_side(t[2], t[0]);
+    std::array<std::uint64_t, 3> sides;
+    for (std::size_t i = 0; i < 3; ++i) {
+      const std::uint64_t from = t[i], to = t[(i + 1) % 3];
+      sides[i] = from == to ? kNoSide : from << 32 | to;
+      added_ += from != to;
+      // Triangles of a cell follow each other, so many sides cancel before they need the table.
+      for (std::uint64_t& before : last_)
+        if (before == (to << 32 | from) && sides[i] != kNoSide) before = sides[i] = kNoSide;
+    }
+    add_last();
+    last_ = sides;
   }
   /// Sides that were added, each triangle's on its own.
   std::uint64_t added() const { return added_; }
@@ -53,6 +62,13 @@ class OpenSides {
     std::uint64_t begin, end;
   };
 
+  /// Puts the sides of the last triangle in the table, but for those that have cancelled.
+  void add_last() {
+    for (const std::uint64_t side : last_)
+      if (side != kNoSide)
+        add_side(static_cast<std::uint32_t>(side >> 32), static_cast<std::uint32_t>(side));
+    last_ = {kNoSide, kNoSide, kNoSide};
+  }
   void add_side(std::uint32_t from, std::uint32_t to);
   std::size_t home_of(std::uint64_t key) const {
     return static_cast<std::size_t>(key * 0x9e3779b97f4a7c15u >> table_shift_);
@@ -65,8 +81,10 @@ class OpenSides {
   void merge_runs(const std::function<void(const Side&)>& f);
   std::uint64_t buffer_sides() const { return runs_file_.memory() / sizeof(Side) / kFanIn + 1; }
 
-  static constexpr std::size_t kFanIn = 16;  ///< runs that are merged at a time
+  static constexpr std::uint64_t kNoSide = 0;  ///< between a vertex and itself
+  static constexpr std::size_t kFanIn = 16;    ///< runs that are merged at a time
 
+  std::array<std::uint64_t, 3> last_{};  ///< sides of the last triangle, from << 32 | to
   std::size_t max_table_;
   std::vector<Side> table_;  ///< a power of two, at most half of it in use; excess 0 is free
   unsigned table_shift_ = 0;
