@@ -3,9 +3,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include <isobrick/error.h>
 #include <isobrick/index_build.h>
-#include "io/bytes/url.h"
 #include "tools/format.h"
 #include "tools/index_options.h"
 #include "tools/interrupt.h"
@@ -41,10 +39,6 @@ std::string text_of(const IndexArguments& arguments, const IndexReport& report) 
 
 int run_index(const IndexArguments& arguments, Console& console) {
   check_store(arguments.store);
-  if (is_url(arguments.store))
-    throw UsageError(fmt::format(
-        "'{0}': nothing can be written to a URL; make a store of it: isobrick convert {0} OUT.zarr",
-        arguments.store));
   set_interrupt_note([] { return "the same command with --resume goes on with what is done"; });
   const IndexReport report = add_index(arguments.store, arguments.index, console.progress());
   const nlohmann::ordered_json object{

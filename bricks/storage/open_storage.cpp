@@ -19,8 +19,8 @@ bool is_zip(const fs::path& path) {
   return path.extension() == ".zip" || is_zip_head(open_input(path).text_at(0, 4));
 }
 
-std::shared_ptr<const Storage> open_storage(const fs::path& path) {
-  if (is_url(path.native())) return open_remote_storage(path.native());
+std::shared_ptr<const Storage> open_storage(const fs::path& path, const RemoteOptions& options) {
+  if (is_url(path.native())) return open_remote_storage(path.native(), options);
   std::error_code failure;
   const fs::file_status status = fs::status(path, failure);
   if (status.type() == fs::file_type::none)

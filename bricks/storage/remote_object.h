@@ -40,6 +40,7 @@ class RangeFetcher : public std::enable_shared_from_this<RangeFetcher> {
   void forget(const RemoteObject& object);
 
   HttpClient& client() { return *client_; }
+  std::uint64_t max_bytes() const { return max_bytes_; }
 
  private:
   using Clock = std::chrono::steady_clock;

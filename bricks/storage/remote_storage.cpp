@@ -68,6 +68,7 @@ class RemoteStorage final : public Storage, public std::enable_shared_from_this<
 
   void will_open(const std::string& key) const override { begin_open(key); }
   bool is_remote() const override { return true; }
+  std::uint64_t memory() const override { return fetcher_->max_bytes(); }
 
   std::vector<std::string> list(const std::string& folder) const override {
     if (place_.list_url.empty()) return {};
@@ -234,14 +235,15 @@ std::shared_ptr<const Storage> remote_storage(const std::string& url,
   return make_storage(url, options);
 }
 
-std::shared_ptr<const Storage> open_remote_storage(const std::string& url) {
+std::shared_ptr<const Storage> open_remote_storage(const std::string& url,
+                                                   const RemoteOptions& options) {
   const auto [folder, name] = split_last(url);
   if (name.ends_with(".zip") || name.ends_with(".ozx")) {
-    const auto object = make_storage(folder, {})->open(name);
+    const auto object = make_storage(folder, options)->open(name);
     if (!object) throw Error(fmt::format("'{}' does not exist", url));
     return zip_storage(object);
   }
-  const auto storage = make_storage(url, {});
+  const auto storage = make_storage(url, options);
   for (const char* key : kZarrFiles) storage->will_open(key);
   const auto is_there = [&](const char* key) { return storage->open(key) != nullptr; };
   if (std::ranges::any_of(kZarrFiles, is_there)) return storage;

@@ -15,7 +15,8 @@ std::shared_ptr<const Storage> remote_storage(const std::string& url, const Remo
 
 /// The storage of a store or of a zip of one that a URL names: open_storage(). Throws Error where
 /// neither is there.
-std::shared_ptr<const Storage> open_remote_storage(const std::string& url);
+std::shared_ptr<const Storage> open_remote_storage(const std::string& url,
+                                                   const RemoteOptions& options);
 
 /// Names below a prefix in a reply of S3's ListObjectsV2, without the prefix. Throws Error for
 /// another reply.

@@ -17,6 +17,8 @@ void Storage::will_open(const std::string& /*key*/) const {}
 
 bool Storage::is_remote() const { return false; }
 
+std::uint64_t Storage::memory() const { return 0; }
+
 std::filesystem::path Storage::local_path() const { return {}; }
 
 std::string join_key(std::string_view folder, std::string_view name) {

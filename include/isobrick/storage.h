@@ -56,6 +56,8 @@ class ISOBRICK_API Storage {
   virtual std::vector<std::string> list(const std::string& folder) const = 0;
   /// Whether objects are on another machine: reads take long to begin, hints count.
   virtual bool is_remote() const;
+  /// Bytes of objects that it holds at most to make reads fast.
+  virtual std::uint64_t memory() const;
   /// The folder or file on this machine in which all objects lie; empty where there is none.
   virtual std::filesystem::path local_path() const;
 };
@@ -104,8 +106,8 @@ struct RemoteOptions {
 };
 
 /// The objects below a URL: https://…, http://… or s3://BUCKET/PATH. Reads ranges of bytes, many at
-/// a time, and those of StoredObject::will_need() ahead; close ones with one request. Where a server
-/// names the state of an object (ETag), all its bytes are of one state.
+/// a time, and those of StoredObject::will_need() ahead; close ones with one request. Where a
+/// server names the state of an object (ETag), all its bytes are of one state.
 ///
 /// S3: the variables AWS_ACCESS_KEY_ID, AWS_SECRET_ACCESS_KEY, AWS_SESSION_TOKEN, AWS_PROFILE,
 /// AWS_REGION, AWS_ENDPOINT_URL_S3 and the files ~/.aws/credentials and ~/.aws/config count, as for
@@ -118,8 +120,9 @@ ISOBRICK_API std::shared_ptr<const Storage> remote_storage(const std::string& ur
                                                            const RemoteOptions& options = {});
 
 /// A folder, a zip or the URL of either, whichever `path` is. Throws Error where it is neither or
-/// cannot be looked at, and what zip_storage() and remote_storage() do.
-ISOBRICK_API std::shared_ptr<const Storage> open_storage(const std::filesystem::path& path);
+/// cannot be looked at, and what zip_storage() and remote_storage() do. The options are for URLs.
+ISOBRICK_API std::shared_ptr<const Storage> open_storage(const std::filesystem::path& path,
+                                                         const RemoteOptions& options = {});
 
 /// How write_zip() writes.
 struct ZipOptions {

@@ -292,7 +292,8 @@ ExtractEstimate estimate(const StoreReader& store, const ExtractOptions& options
   request.active_bricks = parts.active_bricks;
   request.sink_bytes = sink_bytes;
   const ExtractPlan plan =
-      plan_memory({&request, 1}, options.memory, decode_extra(store.info(), request.threads));
+      plan_memory({&request, 1}, options.memory,
+                  decode_extra(store.info(), request.threads) + store.storage()->memory());
   ExtractEstimate result{.active = parts, .memory = plan.bytes};
   const std::vector<TileGroup> groups = sample.chosen();
   std::vector<TileWork> tiles;

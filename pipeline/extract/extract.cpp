@@ -55,7 +55,8 @@ class Extraction {
       requests_.back().sink_bytes = output.sink->memory();
       sinks_.push_back(output.sink);
     }
-    other_bytes_ = decode_extra(store.info(), requests_.front().threads);
+    other_bytes_ =
+        decode_extra(store.info(), requests_.front().threads) + store.storage()->memory();
   }
 
   std::vector<ExtractReport> run(Progress& progress) {
@@ -243,7 +244,8 @@ std::uint64_t min_extract_memory(const StoreReader& store, const ExtractOptions&
                                  Indexing indexing, std::uint64_t sink_bytes) {
   ExtractRequest request = check_request(store, options, indexing);
   request.sink_bytes = sink_bytes;
-  return least_memory({&request, 1}, decode_extra(store.info(), request.threads));
+  return least_memory({&request, 1},
+                      decode_extra(store.info(), request.threads) + store.storage()->memory());
 }
 
 ExtractReport extract(const StoreReader& store, const ExtractOptions& options, MeshSink& sink,

@@ -18,6 +18,7 @@
 #include "index/leaf_ranges.h"
 #include "io/bytes/exchange.h"
 #include "io/bytes/output_folder.h"
+#include "io/bytes/url.h"
 #include "pipeline/index/add_ranges.h"
 #include "pipeline/index/index_chunk_builder.h"
 #include "pipeline/program_memory.h"
@@ -244,6 +245,10 @@ void check_index_options(const IndexOptions& options, const Lattice& lattice,
 }
 
 IndexReport add_index(const fs::path& store, const IndexOptions& options, Progress& listener) {
+  if (is_url(store.native()))
+    throw UsageError(fmt::format(
+        "'{0}': nothing can be written to a URL; make a store of it: isobrick convert {0} OUT.zarr",
+        store.native()));
   CancellableProgress progress(listener, options.cancel);
   Stopwatch watch;
   Workers workers(options.threads);

@@ -32,11 +32,18 @@ def _zarr_path(source):
     return os.path.join(str(folder), source.path)
 
 
+def is_url(path):
+    """Whether it is a URL of a scheme that can be read."""
+    return path.startswith(("http://", "https://", "s3://"))
+
+
 def source_path(source):
-    """The path of a file, or of a Zarr array or group on the disk."""
+    """The path of a file, or of a Zarr array or group on the disk, or a URL."""
     if hasattr(source, "store") and hasattr(source, "path") and hasattr(source, "attrs"):
         source = _zarr_path(source)
     path = path_text(source)
+    if is_url(path):
+        return path
     # The name of an array may follow that of its file: run.h5:/density.
     ends = [i for i in range(len(path)) if path.startswith(":/", i)] + [len(path)]
     if not any(os.path.exists(path[:end]) for end in ends):
@@ -105,8 +112,8 @@ def open(
     Parameters
     ----------
     source : str, path, or a zarr array or group on the disk
-        A store or a zip of one, a file of a known format, a folder of slices, FILE:/NAME for an
-        array in a file.
+        A store or a zip of one, or the URL of either (http, https, s3); a file of a known format,
+        a folder of slices, FILE:/NAME for an array in a file.
     cache : bool or path
         Where stores of other formats are kept: True for ~/.cache/isobrick, or a folder. False:
         they go with the volume.
@@ -146,4 +153,5 @@ def open(
     arguments = dict(
         request, cache=cache, cache_limit=cache_limit, memory=memory, threads=threads
     )
-    return Volume(native, (_reopened, (os.path.abspath(path), arguments)))
+    place = path if is_url(path) else os.path.abspath(path)
+    return Volume(native, (_reopened, (place, arguments)))

@@ -1,7 +1,11 @@
 """Volumes in stores and files."""
 
+import functools
 import gc
+import http.server
+import os
 import pickle
+import threading
 import zipfile
 
 import numpy as np
@@ -257,3 +261,48 @@ def test_arguments_that_make_no_sense(store):
 def test_a_surface_of_a_store_is_closed(tmp_path):
     isobrick.synth("sphere", tmp_path / "a.zarr", shape=(40, 40, 40), dtype="float32")
     assert is_closed(isobrick.open(tmp_path / "a.zarr").extract(0).faces)
+
+
+@pytest.fixture
+def server(store):
+    """The URL of the folder that holds the store."""
+    folder = os.path.dirname(store)
+    handler = functools.partial(RangeHandler, directory=folder)
+    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler) as running:
+        threading.Thread(target=running.serve_forever, daemon=True).start()
+        yield f"http://127.0.0.1:{running.server_address[1]}"
+        running.shutdown()
+
+
+class RangeHandler(http.server.SimpleHTTPRequestHandler):
+    """The server of the standard library, with ranges of bytes."""
+
+    def do_GET(self):
+        path = self.translate_path(self.path)
+        if not os.path.isfile(path):
+            return self.send_error(404)
+        with open(path, "rb") as file:
+            data = file.read()
+        first, last = (int(n) for n in self.headers["range"].split("=")[1].split("-"))
+        self.send_response(206)
+        part = data[first : last + 1]
+        self.send_header("content-range", f"bytes {first}-{first + len(part) - 1}/{len(data)}")
+        self.send_header("content-length", str(len(part)))
+        self.end_headers()
+        self.wfile.write(part)
+
+    def log_message(self, *_):
+        pass
+
+
+def test_stores_behind_urls(store, server):
+    url = f"{server}/{os.path.basename(store)}"
+    remote, local = isobrick.open(url), isobrick.open(store)
+    assert remote.shape == local.shape and remote.path == url
+    assert np.array_equal(remote[3:9, ::2, 5], local[3:9, ::2, 5])
+    assert same(remote.extract(100), local.extract(100))
+    assert same(pickle.loads(pickle.dumps(remote)).extract(100), local.extract(100))
+    with pytest.raises(isobrick.Error, match="nothing.zarr' is no store"):
+        isobrick.open(f"{server}/nothing.zarr")
+    with pytest.raises(isobrick.UsageError, match="nothing can be written to a URL"):
+        isobrick.index(url, "octree")

@@ -14,20 +14,50 @@ Prints its port. The first part of a path names what is wrong with it:
     /forbidden/…        403 for what is missing
     /changing/…         another ETag at each reply
     /secret/…           403 without "?token=abc"
+    /bucket/…           as S3: the keys of a bucket, for requests that key "AKTEST" with the secret
+                        "s/e+cret" has signed for the region "test-1"; lists them too
 
 GET /requests returns how many there were, and how many bytes were sent; GET /reset sets both to 0.
 """
 
 import asyncio
 import hashlib
+import hmac
 import os
 import sys
 import time
-from urllib.parse import unquote, urlsplit
+from urllib.parse import parse_qsl, quote, unquote, urlsplit
 
 REASONS = {200: "OK", 206: "Partial Content", 403: "Forbidden", 404: "Not Found", 412: "Changed",
            416: "Range Not Satisfiable", 429: "Too Many Requests", 500: "Error",
            503: "Service Unavailable"}
+
+
+def is_signed(line, headers):
+    """Whether a request has the signature of AWS's version 4."""
+    scheme, _, rest = headers.get("authorization", "").partition(" ")
+    if scheme != "AWS4-HMAC-SHA256":
+        return False
+    fields = dict(f.strip().split("=", 1) for f in rest.split(","))
+    key, day, region, service, last = fields["Credential"].split("/")
+    if (key, region, service, last) != ("AKTEST", "test-1", "s3", "aws4_request"):
+        return False
+    parts = urlsplit(line[1])
+    names = fields["SignedHeaders"].split(";")
+    if not {"host", "x-amz-date", "x-amz-content-sha256"} <= set(names):
+        return False
+    query = "&".join(f"{quote(k, safe='-_.~')}={quote(v, safe='-_.~')}"
+                     for k, v in sorted(parse_qsl(parts.query, keep_blank_values=True)))
+    canonical = "\n".join([line[0], parts.path, query,
+                           *(f"{n}:{' '.join(headers[n].split())}" for n in names), "",
+                           ";".join(names), headers["x-amz-content-sha256"]])
+    scope = "/".join([day, region, service, last])
+    text = "\n".join(["AWS4-HMAC-SHA256", headers["x-amz-date"], scope,
+                      hashlib.sha256(canonical.encode()).hexdigest()])
+    signing = b"AWS4s/e+cret"
+    for part in (day, region, service, last):
+        signing = hmac.new(signing, part.encode(), hashlib.sha256).digest()
+    return hmac.new(signing, text.encode(), hashlib.sha256).hexdigest() == fields["Signature"]
 
 
 class Server:
@@ -63,9 +93,10 @@ class Server:
         self.requests += 1
         mode, _, name = path.partition("/")
         mode, *numbers = mode.split(":")
-        return await self.answer(writer, mode, [int(n) for n in numbers], name, headers, parts.query)
+        return await self.answer(writer, line, mode, [int(n) for n in numbers], name, headers,
+                                 parts.query)
 
-    async def answer(self, writer, mode, numbers, name, headers, query):
+    async def answer(self, writer, line, mode, numbers, name, headers, query):
         if os.environ.get("HTTP_LOG"):
             print("%.3f" % time.monotonic(), name, headers.get("range"), file=sys.stderr, flush=True)
         tries = self.seen.get((mode, name, headers.get("range")), 0) + 1
@@ -80,6 +111,11 @@ class Server:
         if mode == "reset" and fails:
             writer.transport.abort()
             return False
+        if mode == "bucket":
+            if not is_signed(line, headers):
+                return await self.send(writer, 403, b"<Error><Code>SignatureDoesNotMatch</Code>")
+            if not name:
+                return await self.send(writer, 200, self.listing(query))
         if mode == "secret" and query != "token=abc":
             return await self.send(writer, 403)
         file = os.path.join(self.folder, name)
@@ -111,6 +147,27 @@ class Server:
             await self.send(writer, status, data, more, len(data) // 2)
             return False
         return await self.send(writer, status, data, more)
+
+    def listing(self, query):
+        """What is directly below a prefix, a name at a time, so that lists have several parts."""
+        query = dict(parse_qsl(query))
+        prefix, after = query["prefix"], query.get("continuation-token", "")
+        found = {}
+        for folder, _, files in os.walk(self.folder):
+            for file in files:
+                key = os.path.relpath(os.path.join(folder, file), self.folder)
+                if key.startswith(prefix):
+                    rest, slash, _ = key[len(prefix):].partition("/")
+                    found[prefix + rest + slash] = bool(slash)
+        names = sorted(n for n in found if n > after)
+        text = "<ListBucketResult>"
+        if len(names) > 1:
+            text += f"<IsTruncated>true</IsTruncated><NextContinuationToken>{names[0]}"
+            text += "</NextContinuationToken>"
+        for name in names[:1]:
+            text += (f"<CommonPrefixes><Prefix>{name}</Prefix></CommonPrefixes>" if found[name] else
+                     f"<Contents><Key>{name}</Key></Contents>")
+        return (text + "</ListBucketResult>").encode()
 
     async def send(self, writer, status, data=b"", more=(), count=None):
         head = [f"HTTP/1.1 {status} {REASONS[status]}", f"Content-Length: {len(data)}", *more]

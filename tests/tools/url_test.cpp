@@ -53,8 +53,8 @@ class Url : public ProgramTest {
     if (!available("python3")) GTEST_SKIP() << "python3 is not there";
     // Of several shards, so that there are several objects.
     store_ = path("smooth.zarr");
-    ASSERT_EQ(run({"synth", "gyroid", store_, "--dims", "130,96,90", "--type", "u8", "--brick", "16",
-                   "--shard", "64"})
+    ASSERT_EQ(run({"synth", "gyroid", store_, "--dims", "130,96,90", "--type", "u8", "--brick",
+                   "16", "--shard", "64"})
                   .exit_code,
               0);
     server_ = std::make_unique<Server>(path(""));
@@ -123,6 +123,29 @@ TEST_F(Url, EveryReadingCommandTakesThem) {
   // The spacing of the request is that of a store made for it.
   EXPECT_TRUE(mesh_of(url("plain"), {"--spacing", "2,3,4"}) ==
               mesh_of(store_, {"--spacing", "2,3,4"}));
+}
+
+TEST_F(Url, BucketsOfS3) {
+  const auto with = [&](const std::string& secret, Arguments words) {
+    Arguments all{"env",
+                  "AWS_ENDPOINT_URL_S3=" + url("", ""),
+                  "AWS_ACCESS_KEY_ID=AKTEST",
+                  "AWS_SECRET_ACCESS_KEY=" + secret,
+                  "AWS_REGION=test-1",
+                  ISOBRICK_PROGRAM};
+    all.insert(all.end(), words.begin(), words.end());
+    return run_process(all);
+  };
+  ASSERT_EQ(run({"index", store_, "--kind", "octree"}).exit_code, 0);
+  const Arguments extract{
+      "extract", "s3://bucket/smooth.zarr", "--isovalue", "127.5", "-o", path("m.ply"), "-f", "-q"};
+  const Outcome outcome = with("s/e+cret", extract);
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_TRUE(read_file(path("m.ply")) == expected_);
+  expect_refused(with("wrong", extract), 1, {"s3://bucket/smooth.zarr", "403", "credentials"});
+  // Its objects are listed, a part of the list after another.
+  const Outcome info = with("s/e+cret", {"info", "s3://bucket/smooth.zarr"});
+  EXPECT_NE(info.out.find("octree"), std::string::npos) << info.out << info.err;
 }
 
 TEST_F(Url, NothingIsWrittenToOne) {
