@@ -2,11 +2,11 @@
 # shows only that, else the static libraries of the folders.
 option(BUILD_SHARED_LIBS "isobrick::isobrick is one shared library" OFF)
 if(NOT BUILD_SHARED_LIBS)
-  isobrick_interface(isobrick LINK isobrick::pipeline isobrick::meshes)
+  isobrick_interface(isobrick LINK isobrick::pipeline isobrick::meshes isobrick::filters)
   return()
 endif()
 
-set(isobrick_parts core index surface bytes http volumes meshes bricks stream pipeline)
+set(isobrick_parts core index surface bytes http volumes meshes filters bricks stream pipeline)
 foreach(part vtk gpu)
   if(TARGET isobrick_${part})
     list(APPEND isobrick_parts ${part})

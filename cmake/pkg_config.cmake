@@ -15,7 +15,7 @@ if(NOT BUILD_SHARED_LIBS)
   endforeach()
   # A linker reads an archive once, and these call each other.
   set(isobrick_pc_libs "-Wl,--start-group")
-  foreach(part core index surface bytes vtk volumes meshes bricks gpu stream pipeline)
+  foreach(part core index surface bytes http vtk volumes meshes filters bricks gpu stream pipeline)
     if(TARGET isobrick_${part})
       string(APPEND isobrick_pc_libs " -lisobrick_${part}")
     endif()

@@ -24,12 +24,28 @@ using nlohmann::ordered_json;
 /// The files of one surface; null where none was requested.
 struct Sinks {
   std::unique_ptr<MeshSink> mesh, preview;
+  std::unique_ptr<MeshFilter> mesh_filter, preview_filter;  ///< before them; null without filters
+
+  MeshSink* mesh_input() const { return mesh_filter ? mesh_filter.get() : mesh.get(); }
+  MeshSink* preview_input() const { return preview_filter ? preview_filter.get() : preview.get(); }
+  /// Before what the report is of.
+  const MeshFilter* reported_filter() const {
+    return mesh ? mesh_filter.get() : preview_filter.get();
+  }
 };
+
+/// What a surface goes through before `sink`; null where that is nothing.
+std::unique_ptr<MeshFilter> filter_before(MeshSink* sink, MeshFilterOptions options,
+                                          const fs::path& path) {
+  if (!sink || !options.any()) return nullptr;
+  options.scratch_beside = path;
+  return std::make_unique<MeshFilter>(*sink, options);
+}
 
 /// Opens every output before the first extraction, so that one that exists or
 /// cannot be written stops the command at once.
 std::vector<Sinks> open_sinks(const std::vector<ExtractedSurface>& surfaces,
-                              const ExtractArguments& arguments) {
+                              const ExtractArguments& arguments, Progress& progress) {
   const bool force = arguments.force;
   const std::array<fs::path, 1> inputs{arguments.input.path};
   std::vector<Sinks> sinks;
@@ -46,13 +62,22 @@ std::vector<Sinks> open_sinks(const std::vector<ExtractedSurface>& surfaces,
                                             .memory = memory_of_mesh(surface, surfaces.size())});
     if (!surface.preview.empty())
       of_surface.preview = open_preview(surface.preview.string(), force, arguments.preview);
+    MeshFilterOptions filter = surface.filter;
+    // Several may be finished at the same time.
+    if (surfaces.size() * arguments.outputs() == 1) filter.progress = &progress;
+    of_surface.mesh_filter = filter_before(of_surface.mesh.get(), filter, surface.output);
+    filter.measure = filter.measure && !of_surface.mesh;  // once is enough
+    of_surface.preview_filter = filter_before(of_surface.preview.get(), filter, surface.preview);
   }
   return sinks;
 }
 
 /// Why a surface has no triangle.
 std::string why_empty(const ExtractOptions& options, const ExtractReport& report,
-                      const StoreReader& store) {
+                      const FilteredSurface& filtered, const StoreReader& store) {
+  if (filtered.extracted.triangles > 0)
+    return fmt::format("isovalue {}: no component is large enough for --min-component",
+                       options.isovalue);
   const std::string empty = fmt::format("isovalue {}: the surface is empty", options.isovalue);
   if (report.degenerate_triangles > 0) return empty + ", all triangles are degenerate";
   return empty + "; " + range_text(store, options.level);
@@ -60,6 +85,7 @@ std::string why_empty(const ExtractOptions& options, const ExtractReport& report
 
 struct SurfaceReports {
   std::vector<ExtractReport> reports;  ///< of each mesh, or of the picture where there is no mesh
+  std::vector<FilteredSurface> filtered;
   std::vector<PassReport> passes;
 };
 
@@ -73,18 +99,28 @@ SurfaceReports make(const std::vector<ExtractedSurface>& surfaces, const std::ve
     const ExtractOptions& options = surfaces[i].options;
     reported.push_back(outputs.size());
     if (sinks[i].mesh) {
-      outputs.push_back({options.isovalue, options.normals, sinks[i].mesh.get()});
+      outputs.push_back({options.isovalue, options.normals, sinks[i].mesh_input()});
       names.push_back(surfaces[i].output.string());
     }
     if (sinks[i].preview) {
-      outputs.push_back({options.isovalue, true, sinks[i].preview.get()});
+      outputs.push_back({options.isovalue, true, sinks[i].preview_input()});
       names.push_back(surfaces[i].preview.string());
     }
   }
   const std::vector<ExtractReport> reports =
       extract(store, surfaces.front().options, outputs, console.progress());
   SurfaceReports made;
-  for (const std::size_t i : reported) made.reports.push_back(reports[i]);
+  for (std::size_t i = 0; i < surfaces.size(); ++i) {
+    ExtractReport report = reports[reported[i]];
+    FilteredSurface filtered{.extracted = {report.vertices, report.triangles}};
+    if (const MeshFilter* filter = sinks[i].reported_filter()) {
+      report.vertices = filter->size().vertices;
+      report.triangles = filter->size().triangles;
+      filtered.measure = filter->measure();
+    }
+    made.reports.push_back(report);
+    made.filtered.push_back(filtered);
+  }
   made.passes = passes_of(reports, names);
   return made;
 }
@@ -98,6 +134,8 @@ struct CommandOutput {
 CommandOutput estimate_all(const std::vector<ExtractedSurface>& surfaces, const StoreReader& store,
                            Console& console) {
   CommandOutput result;
+  if (surfaces.front().filter.changes_mesh())
+    console.note("the estimate is of the surface before it is filtered");
   for (const ExtractedSurface& surface : surfaces) {
     const ExtractEstimate guess = estimate_one(surface, store);
     result.objects.push_back(estimate_json(surface, guess));
@@ -115,18 +153,20 @@ CommandOutput make_all(const ExtractArguments& arguments,
                        Console& console) {
   check_pictures(surfaces, arguments, store);
   if (!arguments.no_space_check) check_space(surfaces, store);
-  const std::vector<Sinks> sinks = open_sinks(surfaces, arguments);
+  const std::vector<Sinks> sinks = open_sinks(surfaces, arguments, console.progress());
   const SurfaceReports made = make(surfaces, sinks, store, console);
   CommandOutput result;
   for (std::size_t i = 0; i < surfaces.size(); ++i) {
     const ExtractReport& report = made.reports[i];
-    if (report.triangles == 0) console.note(why_empty(surfaces[i].options, report, store));
+    const FilteredSurface& filtered = made.filtered[i];
+    if (report.triangles == 0)
+      console.note(why_empty(surfaces[i].options, report, filtered, store));
     const std::uint64_t bytes = !sinks[i].mesh ? 0
                                 : is_standard_output(arguments.output)
                                     ? sinks[i].mesh->bytes()
                                     : mesh_bytes(surfaces[i].output);
-    result.objects.push_back(report_json(surfaces[i], report, bytes));
-    result.text += report_text(surfaces[i], report, bytes, surfaces.size() == 1);
+    result.objects.push_back(report_json(surfaces[i], report, filtered, bytes));
+    result.text += report_text(surfaces[i], report, filtered, bytes, surfaces.size() == 1);
   }
   result.passes = passes_json(made.passes);
   if (surfaces.size() > 1 || made.passes.size() > 1) result.text += passes_text(made.passes);
@@ -255,6 +295,7 @@ void add_extract(Program& program) {
               "How the surface passes where corners allow several ways: by a rule for faces, or as "
               "the trilinear interpolant does, tunnels included (on the CPU)",
               "consistent"});
+  add_filters(app, arguments->filters);
   add_search(app, arguments->search);
   add_memory(app, arguments->memory);
   add_threads(app, arguments->threads);

@@ -105,6 +105,55 @@ ExtractOptions common_options(const ExtractArguments& arguments) {
   return options;
 }
 
+/// What the filters of a sink hold.
+std::uint64_t filter_memory(const ExtractedSurface& surface) {
+  return surface.filter.any() ? surface.filter.memory : 0;
+}
+
+/// The least budget of an extraction for the mesh of a surface.
+std::uint64_t min_of_mesh(const ExtractedSurface& surface, std::size_t surfaces,
+                          const ExtractArguments& arguments, const StoreReader& store) {
+  return min_extract_memory(
+      store, surface.options, Indexing::welded,
+      filter_memory(surface) + mesh_file_memory(surface.form.format, arguments.threads,
+                                                memory_of_mesh(surface, surfaces)));
+}
+
+/// The same for its picture.
+std::uint64_t min_of_picture(const ExtractedSurface& surface, const ExtractArguments& arguments,
+                             const StoreReader& store) {
+  ExtractOptions picture = surface.options;
+  picture.normals = true;
+  return min_extract_memory(store, picture,
+                            surface.filter.any() ? Indexing::welded : Indexing::chunk_local,
+                            filter_memory(surface) + preview_memory(arguments.preview));
+}
+
+/// The least budget of the whole command for a surface with a picture.
+std::uint64_t min_with_picture(const ExtractedSurface& surface, std::size_t surfaces,
+                               const ExtractArguments& arguments, const StoreReader& store) {
+  std::uint64_t least = min_of_picture(surface, arguments, store);
+  if (!surface.output.empty())
+    least = std::max(least, min_of_mesh(surface, surfaces, arguments, store));
+  return surface.options.memory_of_others + least;
+}
+
+/// Filters get half of what an extraction does not need, and work with little.
+void share_filter_memory(std::vector<ExtractedSurface>& surfaces, const ExtractArguments& arguments,
+                         const StoreReader& store) {
+  constexpr std::uint64_t least = std::uint64_t{8} << 20;
+  const std::uint64_t outputs = surfaces.size() * arguments.outputs();
+  for (ExtractedSurface& surface : surfaces) {
+    if (!surface.filter.any()) return;
+    surface.filter.memory = least;
+    const std::uint64_t needed =
+        std::max(min_of_mesh(surface, surfaces.size(), arguments, store),
+                 surface.preview.empty() ? 0 : min_of_picture(surface, arguments, store));
+    const std::uint64_t budget = surface.options.memory;
+    surface.filter.memory += (budget - std::min(budget, needed)) / 2 / outputs;
+  }
+}
+
 std::vector<ExtractedSurface> surfaces_of_level(const ExtractArguments& arguments,
                                                 const StoreReader& store, int level,
                                                 const std::vector<double>& isovalues) {
@@ -119,9 +168,11 @@ std::vector<ExtractedSurface> surfaces_of_level(const ExtractArguments& argument
         !arguments.output.empty() ? named(arguments.output, isovalue, isovalues.size())
         : arguments.writes_mesh() ? default_output(arguments, form.format, isovalue)
                                   : fs::path();
-    surfaces.push_back(
-        {options, form, output, named(arguments.preview.path, isovalue, isovalues.size())});
+    surfaces.push_back({options, form, output,
+                        named(arguments.preview.path, isovalue, isovalues.size()),
+                        filter_options(arguments.filters)});
   }
+  if (!arguments.estimate) share_filter_memory(surfaces, arguments, store);
   return surfaces;
 }
 
@@ -166,6 +217,7 @@ std::vector<PlannedMesh> planned_meshes(const std::vector<ExtractedSurface>& sur
     PlannedMesh mesh = size_of(i);
     mesh.path = path;
     mesh.form = surface.form;
+    mesh.filter = surface.filter;
     meshes.push_back(std::move(mesh));
   }
   return meshes;
@@ -182,27 +234,13 @@ std::string shortage_text(const PlannedMesh& mesh, const Shortage& shortage, boo
       waits ? fmt::format(" (TMPDIR, now '{}')", mesh.path.parent_path().string()) : "");
 }
 
-/// The least budget of the whole command for a surface with a picture.
-std::uint64_t min_with_picture(const ExtractedSurface& surface, std::size_t surfaces,
-                               const ExtractArguments& arguments, const StoreReader& store) {
-  ExtractOptions picture = surface.options;
-  picture.normals = true;
-  std::uint64_t least =
-      min_extract_memory(store, picture, Indexing::chunk_local, preview_memory(arguments.preview));
-  if (!surface.output.empty())
-    least =
-        std::max(least, min_extract_memory(store, surface.options, Indexing::welded,
-                                           mesh_file_memory(surface.form.format, arguments.threads,
-                                                            memory_of_mesh(surface, surfaces))));
-  return surface.options.memory_of_others + least;
-}
-
 }  // namespace
 
 void check_arguments(const ExtractArguments& arguments) {
   for (const std::string& output : {arguments.output, arguments.preview.path})
     refuse_url_output(output);
   form_of(arguments);
+  check_filters(arguments.filters, arguments.estimate);
   if (is_standard_output(arguments.output) && is_standard_output(arguments.preview.path))
     throw UsageError("standard output takes a mesh or a picture; name a file for one of them");
   if (!arguments.output.empty() && !arguments.preview.path.empty())

@@ -7,6 +7,7 @@
 
 #include <isobrick/store_reader.h>
 #include "tools/extract_report.h"
+#include "tools/filter_options.h"
 #include "tools/input.h"
 #include "tools/pictures.h"
 
@@ -27,6 +28,7 @@ struct ExtractArguments {
   RegionArguments region;
   std::optional<Inside> inside;
   std::optional<bool> normals;  ///< nothing: where the format holds them
+  FilterArguments filters;
   bool drop_degenerate = false;
   Topology topology = Topology::consistent;
   std::uint64_t memory = std::uint64_t{1} << 30;
@@ -39,6 +41,8 @@ struct ExtractArguments {
 
   /// Whether meshes are written.
   bool writes_mesh() const { return !output.empty() || (preview.path.empty() && !estimate); }
+  /// Meshes and pictures of one surface.
+  std::size_t outputs() const { return std::size_t{writes_mesh()} + !preview.path.empty(); }
 };
 
 /// Throws UsageError for arguments that contradict each other, before anything is opened.

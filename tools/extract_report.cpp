@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "tools/format.h"
+#include "tools/measure_report.h"
 #include "tools/mesh_space.h"
 
 namespace isobrick::tools {
@@ -71,7 +72,7 @@ std::string estimate_text(const ExtractedSurface& surface, const ExtractEstimate
 }
 
 ordered_json report_json(const ExtractedSurface& surface, const ExtractReport& r,
-                         std::uint64_t bytes) {
+                         const FilteredSurface& filtered, std::uint64_t bytes) {
   ordered_json object{
       {"isovalue", surface.options.isovalue},
       {"output", nullptr},
@@ -94,13 +95,17 @@ ordered_json report_json(const ExtractedSurface& surface, const ExtractReport& r
         {"seconds", r.search_seconds}}}};
   add_backend(object, r);
   if (surface.options.drop_degenerate) object["degenerate_triangles"] = r.degenerate_triangles;
+  if (surface.filter.changes_mesh())
+    object["extracted"] = {{"triangles", filtered.extracted.triangles},
+                           {"vertices", filtered.extracted.vertices}};
+  if (filtered.measure) object["measure"] = measure_json(*filtered.measure);
   if (!surface.output.empty()) object["output"] = surface.output.string();
   if (!surface.preview.empty()) object["preview"] = surface.preview.string();
   return object;
 }
 
 std::string report_text(const ExtractedSurface& surface, const ExtractReport& r,
-                        std::uint64_t bytes, bool only) {
+                        const FilteredSurface& filtered, std::uint64_t bytes, bool only) {
   std::string text = fmt::format(
       "isovalue {}: {} triangles{}{}\n", surface.options.isovalue, human_count(r.triangles),
       is_welded(surface) ? fmt::format(", {} vertices", human_count(r.vertices)) : "",
@@ -113,6 +118,9 @@ std::string report_text(const ExtractedSurface& surface, const ExtractReport& r,
   if (surface.options.drop_degenerate)
     text +=
         fmt::format("  {} degenerate triangles left out\n", human_count(r.degenerate_triangles));
+  if (filtered.extracted.triangles > r.triangles)
+    text += fmt::format("  of {} triangles\n", human_count(filtered.extracted.triangles));
+  if (filtered.measure) text += measure_text(*filtered.measure);
   if (!surface.output.empty())
     text += fmt::format("  {} ({})\n", surface.output.string(), human_bytes(bytes));
   if (!surface.preview.empty()) text += fmt::format("  {}\n", surface.preview.string());

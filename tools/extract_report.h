@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -10,6 +11,7 @@
 
 #include <isobrick/estimate.h>
 #include <isobrick/extract.h>
+#include <isobrick/mesh_filters.h>
 #include "tools/mesh_output.h"
 
 // What `isobrick extract` reports of each surface.
@@ -21,6 +23,13 @@ struct ExtractedSurface {
   ExtractOptions options = {};
   MeshForm form = {};
   std::filesystem::path output, preview;
+  MeshFilterOptions filter = {};  ///< of each of them; without a place for scratch files
+};
+
+/// What became of a surface on its way to its file.
+struct FilteredSurface {
+  MeshSize extracted;                  ///< before the filters that change the mesh
+  std::optional<MeshMeasure> measure;  ///< where that was requested
 };
 
 /// What is expected of a surface, for --json and for people.
@@ -29,10 +38,10 @@ std::string estimate_text(const ExtractedSurface& surface, const ExtractEstimate
 
 /// What was made; its file has `bytes`.
 nlohmann::ordered_json report_json(const ExtractedSurface& surface, const ExtractReport& r,
-                                   std::uint64_t bytes);
+                                   const FilteredSurface& filtered, std::uint64_t bytes);
 /// What its pass took is in the text where it is the `only` surface.
 std::string report_text(const ExtractedSurface& surface, const ExtractReport& r,
-                        std::uint64_t bytes, bool only);
+                        const FilteredSurface& filtered, std::uint64_t bytes, bool only);
 
 /// What was made in one pass over the store.
 struct PassReport {

@@ -64,11 +64,13 @@ std::optional<Shortage> find_shortage(
   std::uint64_t finished = 0;
   for (std::size_t i = 0; i < meshes.size(); ++i) {
     const PlannedMesh& mesh = meshes[i];
-    const MeshBytes bytes =
-        predict_bytes(mesh.form, {enlarged(mesh.size.vertices, mesh.uncertainty),
-                                  enlarged(mesh.size.triangles, mesh.uncertainty)});
+    const MeshSize size{enlarged(mesh.size.vertices, mesh.uncertainty),
+                        enlarged(mesh.size.triangles, mesh.uncertainty)};
+    const MeshBytes bytes = predict_bytes(mesh.form, size);
+    const std::uint64_t needed =
+        finished + bytes.needed + filter_scratch_bytes(mesh.filter, size, mesh.form.normals);
     const std::uint64_t free = free_space(mesh.path);
-    if (finished + bytes.needed > free) return Shortage{i, finished + bytes.needed, free};
+    if (needed > free) return Shortage{i, needed, free};
     finished += bytes.file;
   }
   return std::nullopt;

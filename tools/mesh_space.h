@@ -7,6 +7,7 @@
 #include <span>
 
 #include <isobrick/mesh.h>
+#include <isobrick/mesh_filters.h>
 #include "tools/mesh_output.h"
 
 namespace isobrick::tools {
@@ -26,7 +27,8 @@ struct PlannedMesh {
   std::filesystem::path path;
   MeshForm form;
   MeshSize size;
-  double uncertainty = 0;  ///< by what fraction it may be larger
+  double uncertainty = 0;         ///< by what fraction it may be larger
+  MeshFilterOptions filter = {};  ///< whose scratch files lie on the same disk
 };
 
 /// The first mesh that does not fit its disk.

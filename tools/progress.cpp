@@ -101,6 +101,7 @@ ConsoleProgress::ConsoleProgress(ProgressForm form) : form_(form) {
 void ConsoleProgress::begin(std::string_view stage, std::uint64_t total) {
   throw_if_interrupted();
   stage_ = stage;
+  is_running_ = true;
   total_ = total;
   done_ = 0;
   start_ = last_ = Clock::now();
@@ -116,7 +117,8 @@ void ConsoleProgress::advance(std::uint64_t done) {
 
 void ConsoleProgress::end() {
   erase();
-  if (writes_end_) write(Clock::now());
+  if (writes_end_ && is_running_) write(Clock::now());
+  is_running_ = false;
   throw_if_interrupted();
 }
 

@@ -43,6 +43,7 @@ class ConsoleProgress final : public Progress {
   std::chrono::milliseconds period_{0};
   bool writes_end_ = false;  ///< also at the end of a stage that was short
   bool drawn_ = false;       ///< a bar is on the line
+  bool is_running_ = false;  ///< a stage is; one that another began within has ended it
   std::string stage_;
   std::uint64_t total_ = 0, done_ = 0;
   Clock::time_point start_, last_;

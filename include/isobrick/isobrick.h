@@ -13,6 +13,7 @@
 #include <isobrick/isovalue.h>
 #include <isobrick/mesh.h>
 #include <isobrick/mesh_file_sink.h>
+#include <isobrick/mesh_filters.h>
 #include <isobrick/mesh_sinks.h>
 #include <isobrick/open_source.h>
 #include <isobrick/open_volume.h>

@@ -206,12 +206,16 @@ void OutputFile::publish() {
   temporary_.clear();
 }
 
-FileWriter open_scratch_beside(const std::string& path, std::size_t memory) {
+File open_scratch_file(const std::string& path) {
   const bool beside = path != kStandardOutput;
   const auto named = beside ? std::filesystem::path(path) : temporary_folder();
   Temporary temporary = create_temporary_file((beside ? named : named / "isobrick").string());
   ::unlink(temporary.path.c_str());
-  return FileWriter({std::move(temporary.fd), named}, memory);
+  return {std::move(temporary.fd), named};
+}
+
+FileWriter open_scratch_beside(const std::string& path, std::size_t memory) {
+  return FileWriter(open_scratch_file(path), memory);
 }
 
 }  // namespace isobrick

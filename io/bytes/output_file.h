@@ -117,7 +117,9 @@ class OutputFile {
 };
 
 /// A nameless file in the folder of `path`, for standard output in that of temporary files: gone
-/// when it is closed, whatever happens. `memory` as FileWriter.
+/// when it is closed, whatever happens. Messages name `path`, or that folder.
+File open_scratch_file(const std::string& path);
+/// The same to append to; `memory` as FileWriter.
 FileWriter open_scratch_beside(const std::string& path, std::size_t memory = FileWriter::kBuffer);
 
 }  // namespace isobrick

@@ -22,7 +22,7 @@ from ._errors import DamageError, Error, FileError, UsageError
 from ._extract import Extractor, extract
 from ._isobrick import __version__
 from ._marching_cubes import marching_cubes
-from ._mesh import Mesh
+from ._mesh import Measure, Mesh
 from ._open import open
 from ._operations import convert, export, index, info, synth, verify
 from ._picture import Picture, render
@@ -37,6 +37,7 @@ __all__ = [
     "FileError",
     "Histogram",
     "Level",
+    "Measure",
     "Mesh",
     "Picture",
     "UsageError",

@@ -26,6 +26,20 @@ class UsageError(Error, ValueError): ...
 class DamageError(Error, OSError): ...
 class FileError(Error, OSError): ...
 
+@dataclass(frozen=True)
+class Measure:
+    vertices: int
+    faces: int
+    area: float
+    volume: Optional[float]
+    open_sides: int
+    components: int
+    euler_number: int
+    bounds: Optional[tuple[tuple[float, float, float], tuple[float, float, float]]]
+    unit: str
+    @property
+    def closed(self) -> bool: ...
+
 class Mesh:
     def __init__(
         self,
@@ -52,6 +66,7 @@ class Mesh:
         quantize: bool = False,
         progress: _Progress = None,
     ) -> None: ...
+    def measure(self) -> Measure: ...
     def to_trimesh(self) -> Any: ...
     def to_vtk(self) -> Any: ...
     def to_pyvista(self) -> Any: ...
@@ -141,6 +156,10 @@ class Extractor:
         inside: _Inside = "above",
         drop_degenerate: bool = False,
         topology: _Topology = "consistent",
+        min_component: int = 0,
+        largest: int = 0,
+        smooth: int = 0,
+        pass_band: float = 0.1,
         memory: _Bytes = ...,
         threads: int = 0,
         progress: _Progress = None,
@@ -155,6 +174,10 @@ class Extractor:
         inside: _Inside = "above",
         drop_degenerate: bool = False,
         topology: _Topology = "consistent",
+        min_component: int = 0,
+        largest: int = 0,
+        smooth: int = 0,
+        pass_band: float = 0.1,
         memory: _Bytes = ...,
         threads: int = 0,
         progress: _Progress = None,
@@ -169,6 +192,11 @@ class Extractor:
         inside: _Inside = "above",
         drop_degenerate: bool = False,
         topology: _Topology = "consistent",
+        min_component: int = 0,
+        largest: int = 0,
+        smooth: int = 0,
+        pass_band: float = 0.1,
+        measure: bool = False,
         memory: _Bytes = ...,
         threads: int = 0,
         progress: _Progress = None,
@@ -193,6 +221,10 @@ def extract(
     inside: _Inside = "above",
     drop_degenerate: bool = False,
     topology: _Topology = "consistent",
+    min_component: int = 0,
+    largest: int = 0,
+    smooth: int = 0,
+    pass_band: float = 0.1,
     memory: _Bytes = ...,
     threads: int = 0,
     progress: _Progress = None,
@@ -214,6 +246,10 @@ def extract(
     inside: _Inside = "above",
     drop_degenerate: bool = False,
     topology: _Topology = "consistent",
+    min_component: int = 0,
+    largest: int = 0,
+    smooth: int = 0,
+    pass_band: float = 0.1,
     memory: _Bytes = ...,
     threads: int = 0,
     progress: _Progress = None,
@@ -294,6 +330,10 @@ class Volume:
         inside: Optional[_Inside] = None,
         drop_degenerate: bool = False,
         topology: _Topology = "consistent",
+        min_component: int = 0,
+        largest: int = 0,
+        smooth: int = 0,
+        pass_band: float = 0.1,
         backend: _Backend = "auto",
         memory: _Bytes = ...,
         threads: int = 0,
@@ -312,6 +352,10 @@ class Volume:
         inside: Optional[_Inside] = None,
         drop_degenerate: bool = False,
         topology: _Topology = "consistent",
+        min_component: int = 0,
+        largest: int = 0,
+        smooth: int = 0,
+        pass_band: float = 0.1,
         backend: _Backend = "auto",
         memory: _Bytes = ...,
         threads: int = 0,
@@ -330,6 +374,11 @@ class Volume:
         inside: Optional[_Inside] = None,
         drop_degenerate: bool = False,
         topology: _Topology = "consistent",
+        min_component: int = 0,
+        largest: int = 0,
+        smooth: int = 0,
+        pass_band: float = 0.1,
+        measure: bool = False,
         backend: _Backend = "auto",
         memory: _Bytes = ...,
         threads: int = 0,

@@ -221,6 +221,21 @@ def extract_options(
     return options
 
 
+def filter_options(*, min_component=0, largest=0, smooth=0, pass_band=0.1, measure=False):
+    """What is done to a mesh on its way to a file or to memory."""
+    options = _isobrick.MeshFilterOptions()
+    options.min_component = integer(min_component, "min_component", 0)
+    options.largest = integer(largest, "largest", 0)
+    if options.min_component and options.largest:
+        raise UsageError("min_component and largest both choose components: give one of them")
+    options.smooth = integer(smooth, "smooth", 0, 10000)
+    options.pass_band = number(pass_band, "pass_band")
+    if not 0 < options.pass_band <= 0.8:
+        raise UsageError(f"pass_band must be above 0 and at most 0.8, not {options.pass_band}")
+    options.measure = bool(measure)
+    return options
+
+
 def mesh_file_options(*, force=False, quantize=False, threads=0, memory=2**30):
     options = _isobrick.MeshFileOptions()
     options.force = bool(force)

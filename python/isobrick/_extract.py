@@ -1,12 +1,12 @@
 """Surfaces of arrays."""
 
 from ._arguments import (
-    box_of, byte_count, extract_options, histogram_bins, is_list, mesh_file_options, number,
-    one_isovalue, path_text, thread_count,
+    box_of, byte_count, extract_options, filter_options, histogram_bins, is_list,
+    mesh_file_options, number, one_isovalue, path_text, thread_count,
 )
 from ._device import DeviceMesh, DeviceSamples, is_on_device
 from ._errors import UsageError
-from ._mesh import Mesh
+from ._mesh import Mesh, with_measure
 from ._progress import reporting
 from ._samples import Samples
 from ._volume import Histogram
@@ -125,7 +125,8 @@ class Extractor:
 
     def extract(
         self, isovalue, *, roi=None, normals=False, inside="above", drop_degenerate=False,
-        topology="consistent", memory=2**30, threads=0, progress=None,
+        topology="consistent", min_component=0, largest=0, smooth=0, pass_band=0.1, memory=2**30,
+        threads=0, progress=None,
     ):
         """The surface of an isovalue as a `Mesh`, or a `DeviceMesh` of an array on a device.
 
@@ -145,6 +146,8 @@ class Extractor:
         topology : "consistent" or "trilinear"
             How the surface passes where the corners of a cell allow several ways: by a rule for
             faces, or as the trilinear interpolant does; not on a device.
+        min_component, largest, smooth, pass_band
+            Filters of the mesh, as of `Volume.extract`; not on a device.
         memory : int or str
             Budget in bytes, or a text such as "512M", for all but the array and the mesh. It does
             not bound device memory.
@@ -155,6 +158,10 @@ class Extractor:
 
         Raises UsageError (a ValueError) for a request that makes no sense.
         """
+        filters = filter_options(
+            min_component=min_component, largest=largest, smooth=smooth, pass_band=pass_band,
+        )
+        self._check_filters(filters)
         several = is_list(isovalue)
         requests = [
             self._surface(
@@ -164,18 +171,23 @@ class Extractor:
             for one in (isovalue if several else [isovalue])
         ]
         with reporting(progress) as report:
-            meshes = [self._mesh(options, report) for options in requests]
+            meshes = [self._mesh(options, filters, report) for options in requests]
         return meshes if several else meshes[0]
 
     def save(
         self, path, isovalue, *, roi=None, normals=False, inside="above", drop_degenerate=False,
-        topology="consistent", memory=2**30, threads=0, progress=None, force=False, quantize=False,
+        topology="consistent", min_component=0, largest=0, smooth=0, pass_band=0.1, measure=False,
+        memory=2**30, threads=0, progress=None, force=False, quantize=False,
     ):
         """Streams a surface to a mesh file, so that the mesh may be larger than memory.
 
         The arguments are those of `extract` and of `Mesh.save`. Returns the numbers of vertices
-        and faces in a dictionary.
+        and faces in a dictionary, and with `measure` a `Measure` of the mesh.
         """
+        filters = filter_options(
+            min_component=min_component, largest=largest, smooth=smooth, pass_band=pass_band,
+            measure=measure,
+        )
         options = self._surface(
             isovalue, roi=roi, normals=normals, inside=inside, drop_degenerate=drop_degenerate,
             topology=topology, memory=memory, threads=threads, progress=progress,
@@ -184,12 +196,19 @@ class Extractor:
         if self._on_device:
             raise UsageError("of an array in device memory, save extract(…).to_host()")
         with reporting(progress) as report:
-            return self._native.save(options, path_text(path), file, report)
+            return with_measure(self._native.save(options, filters, path_text(path), file, report))
 
-    def _mesh(self, options, report):
+    def _mesh(self, options, filters, report):
         if self._on_device:
             return DeviceMesh(self._native.extract(options))
-        return Mesh._of(self._native.extract(options, report))
+        return Mesh._of(self._native.extract(options, filters, report))
+
+    def _check_filters(self, filters):
+        if self._on_device and filters.any():
+            raise UsageError(
+                "meshes in device memory are not filtered; copy the array to the host, or leave out "
+                "min_component, largest and smooth"
+            )
 
     def _check_host(self, what):
         if self._on_device:
@@ -212,7 +231,8 @@ class Extractor:
 def extract(
     array, isovalue, *, spacing=None, origin=None, direction=None, unit=None, mask=None,
     nodata=None, stream=None, roi=None, normals=False, inside="above", drop_degenerate=False,
-    topology="consistent", memory=2**30, threads=0, progress=None,
+    topology="consistent", min_component=0, largest=0, smooth=0, pass_band=0.1, memory=2**30,
+    threads=0, progress=None,
 ):
     """The isosurface of an array [z, y, x] as a `Mesh`, or a `DeviceMesh` of one on a device.
 
@@ -224,6 +244,8 @@ def extract(
         As of `Extractor`: arrays are indexed [z, y, x]; world space is x, y, z.
     isovalue, roi, normals, inside, drop_degenerate, topology, memory, threads, progress
         As of `Extractor.extract`.
+    min_component, largest, smooth, pass_band
+        As of `Volume.extract`.
 
     Examples
     --------
@@ -239,5 +261,6 @@ def extract(
     )
     return extractor.extract(
         isovalue, roi=roi, normals=normals, inside=inside, drop_degenerate=drop_degenerate,
-        topology=topology, memory=memory, threads=threads, progress=progress,
+        topology=topology, min_component=min_component, largest=largest, smooth=smooth,
+        pass_band=pass_band, memory=memory, threads=threads, progress=progress,
     )

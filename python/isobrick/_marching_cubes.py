@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from . import _isobrick
-from ._arguments import extract_options
+from ._arguments import extract_options, filter_options
 from ._errors import UsageError
 from ._mesh import Mesh
 from ._samples import _SUPPORTED
@@ -122,7 +122,7 @@ def _extract(whole, volume, level, allow_degenerate, mask):
         options.roi = _bounds(mask)
         if options.roi is None:
             raise RuntimeError("No surface found at the given iso value.")
-    mesh = Mesh._of(extractor.extract(options, None))
+    mesh = Mesh._of(extractor.extract(options, filter_options(), None))
     if not len(mesh) and not whole.min() <= level <= whole.max():
         raise ValueError("Surface level must be within volume data range.")
     if mask is not None:

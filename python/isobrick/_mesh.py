@@ -1,10 +1,40 @@
 """Meshes in memory."""
 
+from dataclasses import dataclass
+from typing import Optional
+
 import numpy as np
 
 from . import _isobrick
 from ._arguments import mesh_file_options, path_text, unit_text
 from ._progress import reporting
+
+
+@dataclass(frozen=True)
+class Measure:
+    """What a mesh measures, in its unit of length.
+
+    `vertices` are those that triangles name. `components` are parts of which no two share a vertex.
+    `open_sides` are sides of triangles that no other triangle has in reverse. `volume` is what the
+    mesh encloses, negative where it is inside out, or None where it is open. `euler_number` is
+    vertices less sides plus faces: 2 for a sphere, 0 for a torus. `bounds` are ((x, y, z),
+    (x, y, z)), the smallest and the largest coordinates, or None without vertices.
+    """
+
+    vertices: int
+    faces: int
+    area: float
+    volume: Optional[float]
+    open_sides: int
+    components: int
+    euler_number: int
+    bounds: Optional[tuple]
+    unit: str
+
+    @property
+    def closed(self):
+        """Whether no side is open."""
+        return self.open_sides == 0
 
 
 class Mesh:
@@ -105,6 +135,10 @@ class Mesh:
         with reporting(progress) as report:
             self._native.save(path_text(path), options, report)
 
+    def measure(self):
+        """Area, enclosed volume, components, Euler number and bounds, as a `Measure`."""
+        return Measure(**self._native.measure())
+
     def to_trimesh(self):
         """A `trimesh.Trimesh` of the same vertices and faces."""
         import trimesh
@@ -151,6 +185,11 @@ class Mesh:
 
         data = {} if self.normals is None else {"normals": self.normals}
         return meshio.Mesh(self.vertices, [("triangle", self.faces)], point_data=data)
+
+
+def with_measure(report):
+    """What a file was made of, with a `Measure` where one was requested."""
+    return {**report, "measure": Measure(**report["measure"])} if "measure" in report else report
 
 
 def _rebuilt(vertices, faces, normals, unit):

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from ._arguments import (
-    box_of, extract_options, histogram_bins, integer, is_list, mesh_file_options, number,
-    one_isovalue, path_text, thread_count,
+    box_of, extract_options, filter_options, histogram_bins, integer, is_list, mesh_file_options,
+    number, one_isovalue, path_text, thread_count,
 )
 from ._errors import UsageError
 from ._indexing import read_indexed
-from ._mesh import Mesh
+from ._mesh import Mesh, with_measure
 from ._progress import reporting
 
 
@@ -169,8 +169,8 @@ class Volume:
 
     def extract(
         self, isovalue, *, level=0, roi=None, normals=False, inside=None, drop_degenerate=False,
-        topology="consistent", backend="auto", memory=2**30, threads=0, gpu_memory=0, device=0,
-        progress=None,
+        topology="consistent", min_component=0, largest=0, smooth=0, pass_band=0.1, backend="auto",
+        memory=2**30, threads=0, gpu_memory=0, device=0, progress=None,
     ):
         """The surface of an isovalue as a `Mesh`.
 
@@ -192,6 +192,14 @@ class Volume:
         topology : "consistent" or "trilinear"
             How the surface passes where the corners of a cell allow several ways: by a rule for
             faces, or as the trilinear interpolant does; on the CPU.
+        min_component : int
+            Drops components with fewer triangles.
+        largest : int
+            Keeps so many components, those with most triangles; 0: all.
+        smooth : int
+            Iterations of smoothing that keeps the size (Taubin); open borders stay where they are.
+        pass_band : float
+            Of the smoothing: what varies more along the surface goes, from 0, all, to 0.8, little.
         backend : "auto", "cpu" or "cuda"
             What makes the surface; the mesh is the same.
         memory, gpu_memory : int or str
@@ -206,31 +214,40 @@ class Volume:
             drop_degenerate=drop_degenerate, topology=topology, backend=backend, memory=memory,
             threads=threads, gpu_memory=gpu_memory, device=device, progress=progress,
         )
+        filters = filter_options(
+            min_component=min_component, largest=largest, smooth=smooth, pass_band=pass_band,
+        )
         if is_list(isovalue):
-            return self._extract_several(isovalue, request)
+            return self._extract_several(isovalue, request, filters)
         options = self._surface(isovalue, **request)
         with reporting(progress) as report:
-            return Mesh._of(self._native.extract(options, report))
+            return Mesh._of(self._native.extract(options, filters, report))
 
-    def _extract_several(self, isovalues, request):
+    def _extract_several(self, isovalues, request, filters):
         isovalues = [self.isovalue(one, progress=request["progress"]) for one in isovalues]
         if not isovalues:
             return []
         options = self._surface(isovalues[0], **request)
         with reporting(request["progress"]) as report:
-            meshes = self._native.extract_several(options, isovalues, report)
+            meshes = self._native.extract_several(options, filters, isovalues, report)
         return [Mesh._of(mesh) for mesh in meshes]
 
     def save_mesh(
         self, path, isovalue, *, level=0, roi=None, normals=False, inside=None,
-        drop_degenerate=False, topology="consistent", backend="auto", memory=2**30, threads=0,
-        gpu_memory=0, device=0, progress=None, force=False, quantize=False,
+        drop_degenerate=False, topology="consistent", min_component=0, largest=0, smooth=0,
+        pass_band=0.1, measure=False, backend="auto", memory=2**30, threads=0, gpu_memory=0, device=0,
+        progress=None, force=False, quantize=False,
     ):
         """Streams a surface to a mesh file, so that volume and mesh may be larger than memory.
 
         The arguments are those of `extract` and of `Mesh.save`. Returns a dictionary of what was
-        done: vertices, faces, bricks, bricks_read, bytes_read, backend, seconds.
+        done: vertices, faces, bricks, bricks_read, bytes_read, backend, seconds, and with
+        `measure` a `Measure` of the mesh.
         """
+        filters = filter_options(
+            min_component=min_component, largest=largest, smooth=smooth, pass_band=pass_band,
+            measure=measure,
+        )
         options = self._surface(
             isovalue, progress=progress, level=level, roi=roi, normals=normals, inside=inside,
             drop_degenerate=drop_degenerate, topology=topology, backend=backend, memory=memory,
@@ -238,7 +255,9 @@ class Volume:
         )
         file = mesh_file_options(force=force, quantize=quantize, threads=threads, memory=memory)
         with reporting(progress) as report:
-            return self._native.save_mesh(options, path_text(path), file, report)
+            return with_measure(
+                self._native.save_mesh(options, filters, path_text(path), file, report)
+            )
 
     def estimate(self, isovalue, *, level=0, roi=None):
         """About how large a mesh will be: vertices, faces and their relative uncertainty."""

@@ -9,9 +9,12 @@
 
 #include <isobrick/error.h>
 #include <isobrick/mesh_file_sink.h>
+#include <isobrick/mesh_filters.h>
+#include <isobrick/mesh_sinks.h>
 #include "python/src/bindings.h"
 #include "python/src/cancellable_sink.h"
 #include "python/src/casters.h"
+#include "python/src/filtered.h"
 #include "python/src/interruptible.h"
 #include "python/src/isovalues.h"
 #include "python/src/sample_array.h"
@@ -29,12 +32,19 @@ class ArrayExtractor {
         type_(volume.type),
         extractor_(volume) {}
 
-  std::unique_ptr<Mesh> extract(ExtractOptions options, const py::object& callback) {
+  std::unique_ptr<Mesh> extract(ExtractOptions options, const MeshFilterOptions& filters,
+                                const py::object& callback) {
     auto mesh = std::make_unique<Mesh>();
     run_interruptibly(callback, [&](Reporter reporter) {
       const std::lock_guard lock(mutex_);
       options.cancel = reporter.cancel;
-      extractor_.extract(options, *mesh, reporter.progress);
+      if (!filters.any()) {
+        extractor_.extract(options, *mesh, reporter.progress);
+        return;
+      }
+      MemorySink sink(*mesh);
+      MeshFilter filter(sink, within_budget(filters, options.memory, 1, "-", reporter));
+      extractor_.extract(options, filter, reporter.progress);
     });
     return mesh;
   }
@@ -56,15 +66,21 @@ class ArrayExtractor {
     });
   }
 
-  py::dict save(ExtractOptions options, const std::string& path, const MeshFileOptions& file,
-                const py::object& callback) {
-    const SurfaceReport report = interruptible(callback, [&](Reporter reporter) {
+  py::dict save(ExtractOptions options, const MeshFilterOptions& filters, const std::string& path,
+                const MeshFileOptions& file, const py::object& callback) {
+    std::unique_ptr<MeshSink> sink;
+    std::unique_ptr<MeshFilter> filter;
+    run_interruptibly(callback, [&](Reporter reporter) {
       const std::lock_guard lock(mutex_);
       options.cancel = reporter.cancel;
-      const auto sink = create_mesh_file(path, file);
-      return extractor_.extract(options, *sink, reporter.progress);
+      sink = create_mesh_file(path, file);
+      filter = std::make_unique<MeshFilter>(
+          *sink, within_budget(filters, options.memory, 1, path, reporter));
+      extractor_.extract(options, *filter, reporter.progress);
     });
-    return py::dict(py::arg("vertices") = report.vertices, py::arg("faces") = report.triangles);
+    py::dict report;
+    add_filtered(report, *filter);
+    return report;
   }
 
   std::vector<double> isovalues(const std::string& text, int threads, const py::object& callback) {

@@ -15,9 +15,11 @@
 
 #include <isobrick/error.h>
 #include <isobrick/mesh_file_sink.h>
+#include <isobrick/mesh_filters.h>
 #include "core/box_union.h"
 #include "python/src/bindings.h"
 #include "python/src/casters.h"
+#include "python/src/filtered.h"
 #include "python/src/interruptible.h"
 
 namespace isobrick::python {
@@ -155,6 +157,10 @@ void bind_mesh(py::module_& module) {
                                return std::pair(bounds.lo, bounds.hi);
                              })
       .def("write_to", &write_to)
+      .def("measure",
+           [](const Mesh& mesh) {
+             return describe(interruptible(py::none(), [&](Reporter) { return measure(mesh); }));
+           })
       .def("save", [](const Mesh& mesh, const std::string& path, const MeshFileOptions& options,
                       const py::object& callback) {
         run_interruptibly(callback, [&](Reporter reporter) {

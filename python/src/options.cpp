@@ -4,6 +4,7 @@
 
 #include <isobrick/extract.h>
 #include <isobrick/mesh_file_sink.h>
+#include <isobrick/mesh_filters.h>
 #include <isobrick/transform.h>
 #include <isobrick/volume_request.h>
 #include "core/length_unit.h"
@@ -55,6 +56,17 @@ void bind_extract_options(py::module_& module) {
       .def_readwrite("device", &ExtractOptions::device);
 }
 
+void bind_mesh_filter_options(py::module_& module) {
+  py::class_<MeshFilterOptions>(module, "MeshFilterOptions")
+      .def(py::init<>())
+      .def_readwrite("min_component", &MeshFilterOptions::min_component)
+      .def_readwrite("largest", &MeshFilterOptions::largest)
+      .def_readwrite("smooth", &MeshFilterOptions::smooth)
+      .def_readwrite("pass_band", &MeshFilterOptions::pass_band)
+      .def_readwrite("measure", &MeshFilterOptions::measure)
+      .def("any", &MeshFilterOptions::any);
+}
+
 void bind_mesh_file_options(py::module_& module) {
   py::class_<MeshFileOptions>(module, "MeshFileOptions")
       .def(py::init<>())
@@ -98,6 +110,7 @@ void bind_volume_request(py::module_& module) {
 void bind_options(py::module_& module) {
   bind_transform(module);
   bind_extract_options(module);
+  bind_mesh_filter_options(module);
   bind_mesh_file_options(module);
   bind_volume_request(module);
 }

@@ -15,6 +15,7 @@
 #include <isobrick/export.h>
 #include <isobrick/extract.h>
 #include <isobrick/mesh_file_sink.h>
+#include <isobrick/mesh_filters.h>
 #include <isobrick/mesh_sinks.h>
 #include "pipeline/slab_reader.h"
 #include "pipeline/workers.h"
@@ -22,6 +23,7 @@
 #include "python/src/cancellable_sink.h"
 #include "python/src/casters.h"
 #include "python/src/descriptions.h"
+#include "python/src/filtered.h"
 #include "python/src/interruptible.h"
 #include "python/src/isovalues.h"
 #include "python/src/surface_bounds.h"
@@ -48,32 +50,33 @@ std::unique_ptr<OpenedVolume> open_volume(const std::string& path, const VolumeR
   });
 }
 
-std::unique_ptr<Mesh> extract_mesh(const OpenedVolume& volume, ExtractOptions options,
-                                   const py::object& callback) {
-  return interruptible(callback, [&](Reporter reporter) {
-    options.cancel = reporter.cancel;
-    return std::make_unique<Mesh>(extract(volume.store(), options, reporter.progress));
-  });
-}
-
 /// A mesh for each isovalue, made together.
 std::vector<std::unique_ptr<Mesh>> extract_meshes(const OpenedVolume& volume,
                                                   ExtractOptions options,
+                                                  const MeshFilterOptions& filters,
                                                   const std::vector<double>& isovalues,
                                                   const py::object& callback) {
   return interruptible(callback, [&](Reporter reporter) {
     options.cancel = reporter.cancel;
     std::vector<std::unique_ptr<Mesh>> meshes;
-    std::vector<std::unique_ptr<MemorySink>> sinks;
+    std::vector<std::unique_ptr<MeshSink>> sinks, filtered;
     std::vector<SurfaceOutput> outputs;
+    const MeshFilterOptions filter =
+        within_budget(filters, options.memory, isovalues.size(), "-", reporter);
     for (const double isovalue : isovalues) {
       meshes.push_back(std::make_unique<Mesh>());
       sinks.push_back(std::make_unique<MemorySink>(*meshes.back()));
-      outputs.push_back({isovalue, options.normals, sinks.back().get()});
+      filtered.push_back(std::make_unique<MeshFilter>(*sinks.back(), filter));
+      outputs.push_back({isovalue, options.normals, filtered.back().get()});
     }
     extract(volume.store(), options, outputs, reporter.progress);
     return meshes;
   });
+}
+
+std::unique_ptr<Mesh> extract_mesh(const OpenedVolume& volume, const ExtractOptions& options,
+                                   const MeshFilterOptions& filters, const py::object& callback) {
+  return std::move(extract_meshes(volume, options, filters, {options.isovalue}, callback).front());
 }
 
 void extract_to(const OpenedVolume& volume, ExtractOptions options, MeshSink& sink,
@@ -92,17 +95,24 @@ std::pair<Vec3d, Vec3d> bounds_of(const OpenedVolume& volume, ExtractOptions opt
   });
 }
 
-py::dict save_mesh(const OpenedVolume& volume, ExtractOptions options, const std::string& path,
+py::dict save_mesh(const OpenedVolume& volume, ExtractOptions options,
+                   const MeshFilterOptions& filters, const std::string& path,
                    const MeshFileOptions& file, const py::object& callback) {
+  std::unique_ptr<MeshSink> sink;
+  std::unique_ptr<MeshFilter> filter;
   const ExtractReport report = interruptible(callback, [&](Reporter reporter) {
     options.cancel = reporter.cancel;
-    const auto sink = create_mesh_file(path, file);
-    return extract(volume.store(), options, *sink, reporter.progress);
+    sink = create_mesh_file(path, file);
+    filter = std::make_unique<MeshFilter>(
+        *sink, within_budget(filters, options.memory, 1, path, reporter));
+    return extract(volume.store(), options, *filter, reporter.progress);
   });
-  return py::dict(py::arg("vertices") = report.vertices, py::arg("faces") = report.triangles,
+  py::dict result(py::arg("vertices") = report.vertices, py::arg("faces") = report.triangles,
                   py::arg("bricks") = report.bricks, py::arg("bricks_read") = report.bricks_read,
                   py::arg("bytes_read") = report.bytes_read, py::arg("backend") = report.backend,
                   py::arg("seconds") = report.seconds);
+  add_filtered(result, *filter);
+  return result;
 }
 
 py::dict estimate_mesh(const OpenedVolume& volume, const ExtractOptions& options) {

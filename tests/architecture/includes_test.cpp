@@ -22,6 +22,7 @@ const std::map<std::string, Names> kMayInclude = {
     {"io/vtk", {"core", "io/bytes"}},
     {"io/volumes", {"core", "io/bytes", "io/vtk"}},
     {"io/meshes", {"core", "io/bytes", "io/vtk", "isobrick/mesh.h"}},
+    {"filters", {"core", "io/bytes", "isobrick/mesh.h"}},
     {"io/http", {"core", "io/bytes"}},
     {"bricks", {"core", "io/bytes", "io/http"}},
     {"index", {"core"}},
@@ -36,7 +37,7 @@ const std::map<std::string, Names> kMayInclude = {
      {"core", "io/bytes", "io/meshes", "io/volumes", "bricks", "index", "stream", "gpu", "pipeline",
       "viewer/render", "viewer/scene"}},
     // What names all that a program of others begins with.
-    {"isobrick", {"core", "io/meshes", "io/volumes", "bricks", "surface", "pipeline"}},
+    {"isobrick", {"core", "io/meshes", "io/volumes", "filters", "bricks", "surface", "pipeline"}},
 };
 
 /// The room that each public header belongs to.
@@ -48,6 +49,7 @@ const std::map<std::string, Names> kPublicHeaders = {
     {"io/volumes/open", {"open_source"}},
     {"io/volumes/synth", {"synth_source"}},
     {"io/meshes", {"mesh_file_sink"}},
+    {"filters", {"mesh_filters"}},
     {"bricks", {"store_reader"}},
     {"bricks/ranges", {"range_table"}},
     {"bricks/storage", {"storage"}},
@@ -119,8 +121,8 @@ bool allowed(const std::string& folder, const std::string& name) {
 
 /// Calls f(path, its room) for each source file of the library.
 void for_each_file(const std::function<void(const fs::path&, const std::string&)>& f) {
-  for (const char* top : {"include", "core", "io", "bricks", "index", "surface", "gpu", "stream",
-                          "pipeline", "viewer"})
+  for (const char* top : {"include", "core", "io", "filters", "bricks", "index", "surface", "gpu",
+                          "stream", "pipeline", "viewer"})
     for (const auto& entry : fs::recursive_directory_iterator(kRoot / top)) {
       if (!entry.is_regular_file() || !is_source(entry.path())) continue;
       const fs::path name = fs::relative(entry.path(), kRoot);

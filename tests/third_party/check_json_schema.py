@@ -93,6 +93,11 @@ def run_commands(check):
     check.run("extract", "extract", "a.zarr", "--isovalue", "120,130", "-o", "m.ply",
               "--drop-degenerate", "--backend", "cpu")
     check.run("extract", "extract", "a.zarr", "--isovalue", "128", "-o", "m.stl")
+    check.run("extract", "extract", "a.zarr", "--isovalue", "128", "-o", "f.ply", "--measure",
+              "--smooth", "2", "--min-component", "10")
+    check.run("extract", "extract", "a.zarr", "--isovalue", "128", "-o", "f.stl", "--measure",
+              "--largest", "1")
+    check.run("extract", "extract", "a.zarr", "--isovalue", "1000", "-o", "none.ply", "--measure")
     for output in ("e.ply", "e.stl"):
         check.run("extract_estimate", "extract", "a.zarr", "--isovalue", "128", "--estimate",
                   "-o", output)

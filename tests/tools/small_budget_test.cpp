@@ -75,6 +75,17 @@ TEST_F(SmallBudget, TheAdviceIsEnoughForEveryMesh) {
   }
 }
 
+TEST_F(SmallBudget, TheAdviceIsEnoughForFilters) {
+  for (const auto& [name, dims] : {std::pair("tiny", "34,1,3"), std::pair("small", "128,128,96")}) {
+    ASSERT_EQ(run(convert(name, dims)).exit_code, 0);
+    for (const std::string output : {"f.ply", "f.stl"})
+      EXPECT_LE(least({"extract", path(name) + ".zarr", "--isovalue", "100", "--force", "-o",
+                       path(output), "--largest", "9", "--smooth", "2", "--measure"}),
+                64)
+          << output;
+  }
+}
+
 TEST_F(SmallBudget, TheAdviceIsEnoughForAConversionWithAnIndex) {
   for (const auto& [name, dims] : {std::pair("tiny", "34,1,3"), std::pair("small", "128,128,96")})
     for (const Arguments& index :

@@ -1,0 +1,169 @@
+#include <isobrick/mesh_filters.h>
+
+#include <algorithm>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include <isobrick/error.h>
+#include "filters/component_stage.h"
+#include "filters/measure_stage.h"
+#include "filters/smooth_stage.h"
+#include "filters/unweld_stage.h"
+
+namespace isobrick::inline v0 {
+namespace {
+
+constexpr double kMaxPassBand = 0.8;  // beyond 0.87 what alternates would grow
+constexpr int kMaxIterations = 10000;
+
+bool chooses_components(const MeshFilterOptions& options) {
+  return options.min_component > 1 || options.largest > 0;
+}
+
+/// Counts what it passes on.
+class CountStage final : public FilterStage {
+ public:
+  CountStage(MeshSink& next, std::stop_token cancel, Indexing indexing)
+      : FilterStage(next, std::move(cancel)), indexing_(indexing) {}
+
+  Indexing indexing() const override { return indexing_; }
+  void begin(const MeshHeader& header) override { next().begin(header); }
+  void write(const MeshChunk& chunk) override {
+    check_cancelled();
+    size_.vertices += chunk.positions.size();
+    size_.triangles += chunk.triangles.size();
+    next().write(chunk);
+  }
+  void finish() override { next().finish(); }
+  MeshSize size() const { return size_; }
+
+ private:
+  std::uint64_t own_bytes() const override { return 0; }
+  std::uint64_t own_memory() const override { return 0; }
+
+  Indexing indexing_;
+  MeshSize size_;
+};
+
+/// Takes a mesh to nowhere.
+class NoSink final : public MeshSink {
+ public:
+  Indexing indexing() const override { return Indexing::welded; }
+  void begin(const MeshHeader&) override {}
+  void write(const MeshChunk&) override {}
+  void finish() override {}
+  std::uint64_t bytes() const override { return 0; }
+};
+
+/// Room for all of a mesh that lies in memory itself.
+constexpr std::uint64_t kAllMemory = std::uint64_t{1} << 60;
+
+void check_numbers(const Mesh& mesh) {
+  for (const Triangle& t : mesh.triangles)
+    for (const std::uint32_t vertex : t)
+      if (vertex >= mesh.positions.size())
+        throw UsageError(fmt::format("a triangle names vertex {}, but the mesh has {} vertices",
+                                     vertex, mesh.positions.size()));
+}
+
+}  // namespace
+
+void check_filters(const MeshFilterOptions& options) {
+  if (options.min_component > 0 && options.largest > 0)
+    throw UsageError(
+        "components are chosen by the triangles that each needs or as the largest ones: give one "
+        "of both");
+  if (options.smooth < 0 || options.smooth > kMaxIterations)
+    throw UsageError(
+        fmt::format("smoothing takes 0 to {} iterations, not {}", kMaxIterations, options.smooth));
+  if (!(options.pass_band > 0 && options.pass_band <= kMaxPassBand))
+    throw UsageError(fmt::format("the pass band must be above 0 and at most {}, not {}",
+                                 kMaxPassBand, options.pass_band));
+}
+
+std::uint64_t filter_scratch_bytes(const MeshFilterOptions& options, MeshSize mesh,
+                                   bool has_normals) {
+  const std::uint64_t v = mesh.vertices, triangles = mesh.triangles * sizeof(Triangle);
+  const std::uint64_t row = (has_normals ? 2 : 1) * sizeof(Vec3f);
+  std::uint64_t bytes = 0;
+  // Two filters have the mesh at the same time while one passes it on.
+  if (chooses_components(options)) bytes += v * (row + 16) + triangles;
+  if (options.smooth > 0) bytes += v * (row + 20) + triangles;
+  if (options.measure) bytes += v * (sizeof(Vec3f) + 4);
+  return bytes;
+}
+
+/// The filters, of which each writes to the one after it.
+class MeshFilter::Stages {
+ public:
+  Stages(MeshSink& sink, const MeshFilterOptions& options)
+      : place_{.beside = options.scratch_beside.string()}, cancel_(options.cancel), first_(&sink) {
+    check_filters(options);
+    const bool unwelds = options.any() && sink.indexing() == Indexing::chunk_local;
+    const int shares = int{unwelds} + int{options.measure} + int{options.smooth > 0} +
+                       int{chooses_components(options)};
+    memory_ = options.memory / static_cast<std::uint64_t>(std::max(1, shares));
+    // From the sink back to the extraction.
+    if (unwelds) add<UnweldStage>(place_, memory_);
+    count_ = &add<CountStage>(first_->indexing());
+    if (options.measure) measure_ = &add<MeasureStage>(place_, memory_);
+    if (options.smooth > 0)
+      add<SmoothStage>(place_, memory_,
+                       Smoothing{options.smooth, options.pass_band, options.progress});
+    if (chooses_components(options))
+      add<ComponentStage>(place_, memory_, ComponentChoice{options.min_component, options.largest});
+  }
+
+  MeshSink& first() { return *first_; }
+  MeshSize size() const { return count_->size(); }
+  std::optional<MeshMeasure> measure() const {
+    return measure_ ? std::optional(measure_->measure()) : std::nullopt;
+  }
+
+ private:
+  /// Puts a filter before what is there.
+  template <class Stage, class... Arguments>
+  Stage& add(Arguments&&... arguments) {
+    auto stage = std::make_unique<Stage>(*first_, cancel_, std::forward<Arguments>(arguments)...);
+    Stage& added = *stage;
+    first_ = stage.get();
+    stages_.push_back(std::move(stage));
+    return added;
+  }
+
+  ScratchPlace place_;
+  std::stop_token cancel_;
+  std::uint64_t memory_ = 0;  ///< of each filter
+  std::vector<std::unique_ptr<FilterStage>> stages_;
+  const CountStage* count_ = nullptr;
+  const MeasureStage* measure_ = nullptr;
+  MeshSink* first_;
+};
+
+MeshFilter::MeshFilter(MeshSink& sink, const MeshFilterOptions& options)
+    : stages_(std::make_unique<Stages>(sink, options)) {}
+
+MeshFilter::~MeshFilter() = default;
+
+Indexing MeshFilter::indexing() const { return stages_->first().indexing(); }
+void MeshFilter::begin(const MeshHeader& header) { stages_->first().begin(header); }
+void MeshFilter::write(const MeshChunk& chunk) { stages_->first().write(chunk); }
+void MeshFilter::finish() { stages_->first().finish(); }
+std::uint64_t MeshFilter::bytes() const { return stages_->first().bytes(); }
+std::uint64_t MeshFilter::memory() const { return stages_->first().memory(); }
+MeshSize MeshFilter::size() const { return stages_->size(); }
+std::optional<MeshMeasure> MeshFilter::measure() const { return stages_->measure(); }
+
+MeshMeasure measure(const Mesh& mesh) {
+  check_numbers(mesh);
+  NoSink nowhere;
+  MeasureStage stage(nowhere, {}, {}, kAllMemory);
+  stage.begin({.unit = mesh.unit});
+  stage.write(mesh.chunk());
+  stage.finish();
+  return stage.measure();
+}
+
+}  // namespace isobrick

@@ -1,0 +1,109 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <stop_token>
+#include <string>
+
+#include <isobrick/api.h>
+#include <isobrick/mesh.h>
+
+namespace isobrick::inline v0 {
+
+/// What a mesh measures, in world units.
+struct MeshMeasure {
+  std::uint64_t vertices = 0;    ///< that triangles name
+  std::uint64_t triangles = 0;   ///< number of triangles
+  std::uint64_t components = 0;  ///< parts of which no two share a vertex
+  /// Sides of triangles without a reverse: a side from a to b has one where another triangle has a
+  /// side from b to a. Counted exactly.
+  std::uint64_t open_sides = 0;
+  /// Vertices less sides plus triangles: 2 a sphere, 0 a torus. Two opposite sides count as one,
+  /// and so does an open one. Sheets that touch along a side have a side each.
+  std::int64_t euler_number = 0;
+  double area = 0;  ///< of all triangles
+  /// Enclosed, by the divergence theorem: negative where triangles are clockwise seen from outside.
+  /// Nothing where the mesh is open, for then it encloses none.
+  std::optional<double> volume = {};
+  std::optional<MeshBounds> bounds = {};  ///< of the vertices; nothing where there is none
+  std::string unit = {};                  ///< of lengths, as unit_name() has it; empty: unknown
+
+  /// Whether every side has its reverse. So has every side of a mesh without triangles.
+  bool is_closed() const { return open_sides == 0; }
+};
+
+/// What is done to a mesh on its way to a sink, in the order of the members.
+struct MeshFilterOptions {
+  /// Drops components with fewer triangles; 0 and 1 drop none. Components are parts of which no two
+  /// share a vertex.
+  std::uint64_t min_component = 0;
+  /// Keeps so many components, those with most triangles; of equal ones those with the smaller
+  /// first vertex. 0 keeps all.
+  std::uint64_t largest = 0;
+  /// Iterations of Taubin's λ|μ smoothing, each a step that shrinks and one that swells. Vertices
+  /// on open sides stay where they are. Normals become those of the triangles, weighted by area.
+  int smooth = 0;
+  /// Of the smoothing: what varies along the surface more than this is smoothed away. 0 is what
+  /// does not vary, 2 is what alternates from vertex to vertex. Above 0, at most 0.8.
+  double pass_band = 0.1;
+  bool measure = false;  ///< MeshFilter::measure()
+  /// Bytes that all filters hold at most; what does not fit lies in scratch files.
+  std::uint64_t memory = std::uint64_t{256} << 20;
+  /// The file beside which scratch files lie; "-": in the folder of temporary files.
+  std::filesystem::path scratch_beside = "-";
+  /// Ends the operation with Cancelled, soon after a stop is requested on any thread.
+  std::stop_token cancel = {};
+  /// Hears of what takes long in finish(), within the stage of the extraction. It must outlive the
+  /// filter and is called by the thread that calls finish(). Null: nobody. Not for filters that
+  /// several threads may finish, as one extraction of several surfaces does.
+  Progress* progress = nullptr;
+
+  /// Whether the mesh that leaves may be another one than that which enters.
+  bool changes_mesh() const { return min_component > 1 || largest > 0 || smooth > 0; }
+  /// Whether there is anything to do.
+  bool any() const { return changes_mesh() || measure; }
+};
+
+/// Throws UsageError for options that make no sense.
+ISOBRICK_API void check_filters(const MeshFilterOptions& options);
+
+/// Bytes that scratch files take at most for a mesh of this size.
+ISOBRICK_API std::uint64_t filter_scratch_bytes(const MeshFilterOptions& options, MeshSize mesh,
+                                                bool has_normals);
+
+/// Passes a mesh on to another sink, filtered, whatever its size: see MeshFilterOptions::memory.
+/// The mesh that leaves depends on nothing but the mesh that enters and the options, not on its
+/// chunks or the memory. Sinks of both kinds of Indexing get what they take.
+///
+/// Filters that change the mesh write to the sink when the whole mesh is there, in finish().
+class ISOBRICK_API MeshFilter final : public MeshSink {
+ public:
+  /// `sink` must outlive it. Throws as check_filters() does.
+  MeshFilter(MeshSink& sink, const MeshFilterOptions& options);
+  ~MeshFilter() override;
+
+  /// Welded, but that of the sink where there is nothing to do.
+  Indexing indexing() const override;
+  void begin(const MeshHeader& header) override;
+  /// Throws Error for a mesh of more than 2³² − 1 vertices.
+  void write(const MeshChunk& chunk) override;
+  void finish() override;
+  std::uint64_t bytes() const override;
+  std::uint64_t memory() const override;
+
+  /// Of the mesh that left, after finish().
+  MeshSize size() const;
+  /// Of the mesh that left, after finish(), if that was requested.
+  std::optional<MeshMeasure> measure() const;
+
+ private:
+  class Stages;
+  std::unique_ptr<Stages> stages_;
+};
+
+/// Measures a mesh in memory. Throws UsageError where a triangle names a vertex that is not there.
+ISOBRICK_API MeshMeasure measure(const Mesh& mesh);
+
+}  // namespace isobrick

@@ -1,0 +1,27 @@
+#pragma once
+
+#include <cstdint>
+
+#include <isobrick/mesh_filters.h>
+#include "tools/options.h"
+
+// What `isobrick extract` does to meshes on their way to a file.
+namespace isobrick::tools {
+
+/// --min-component, --largest, --smooth, --pass-band and --measure.
+struct FilterArguments {
+  std::uint64_t min_component = 0, largest = 0;  ///< 0: not given
+  int smooth = 0;                                ///< 0: not given
+  std::optional<double> pass_band;
+  bool measure = false;
+};
+
+void add_filters(CLI::App* app, FilterArguments& filters);
+
+/// Throws UsageError for options that contradict each other; `estimates`: nothing is written.
+void check_filters(const FilterArguments& filters, bool estimates);
+
+/// Memory and place are those of the caller.
+MeshFilterOptions filter_options(const FilterArguments& filters);
+
+}  // namespace isobrick::tools
