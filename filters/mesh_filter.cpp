@@ -1,6 +1,7 @@
 #include <isobrick/mesh_filters.h>
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 #include <vector>
 
@@ -9,6 +10,7 @@
 #include <isobrick/error.h>
 #include "filters/component_stage.h"
 #include "filters/measure_stage.h"
+#include "filters/simplify_stage.h"
 #include "filters/smooth_stage.h"
 #include "filters/unweld_stage.h"
 
@@ -81,6 +83,13 @@ void check_filters(const MeshFilterOptions& options) {
   if (!(options.pass_band > 0 && options.pass_band <= kMaxPassBand))
     throw UsageError(fmt::format("the pass band must be above 0 and at most {}, not {}",
                                  kMaxPassBand, options.pass_band));
+  if (!(options.simplify_ratio > 0 && options.simplify_ratio <= 1))
+    throw UsageError(
+        fmt::format("a mesh is simplified to a part of its triangles above 0 and at most 1, not {}",
+                    options.simplify_ratio));
+  if (!(options.max_error >= 0 && std::isfinite(options.max_error)))
+    throw UsageError(
+        fmt::format("the error of a simplification must be a length, not {}", options.max_error));
 }
 
 std::uint64_t filter_scratch_bytes(const MeshFilterOptions& options, MeshSize mesh,
@@ -91,6 +100,7 @@ std::uint64_t filter_scratch_bytes(const MeshFilterOptions& options, MeshSize me
   // Two filters have the mesh at the same time while one passes it on.
   if (chooses_components(options)) bytes += v * (row + 16) + triangles;
   if (options.smooth > 0) bytes += v * (row + 20) + triangles;
+  if (options.simplifies()) bytes += v * (row + 4) + 2 * triangles;
   if (options.measure) bytes += v * (sizeof(Vec3f) + 4);
   return bytes;
 }
@@ -103,12 +113,16 @@ class MeshFilter::Stages {
     check_filters(options);
     const bool unwelds = options.any() && sink.indexing() == Indexing::chunk_local;
     const int shares = int{unwelds} + int{options.measure} + int{options.smooth > 0} +
-                       int{chooses_components(options)};
+                       int{options.simplifies()} + int{chooses_components(options)};
     memory_ = options.memory / static_cast<std::uint64_t>(std::max(1, shares));
     // From the sink back to the extraction.
     if (unwelds) add<UnweldStage>(place_, memory_);
     count_ = &add<CountStage>(first_->indexing());
     if (options.measure) measure_ = &add<MeasureStage>(place_, memory_);
+    if (options.simplifies())
+      add<SimplifyStage>(place_, memory_,
+                         Simplification{options.simplify_ratio, options.simplify_triangles,
+                                        options.max_error, options.threads, options.progress});
     if (options.smooth > 0)
       add<SmoothStage>(place_, memory_,
                        Smoothing{options.smooth, options.pass_band, options.progress});

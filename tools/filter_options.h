@@ -8,11 +8,14 @@
 // What `isobrick extract` does to meshes on their way to a file.
 namespace isobrick::tools {
 
-/// --min-component, --largest, --smooth, --pass-band and --measure.
+/// --min-component, --largest, --smooth, --pass-band, --simplify, --max-error and --measure.
 struct FilterArguments {
   std::uint64_t min_component = 0, largest = 0;  ///< 0: not given
   int smooth = 0;                                ///< 0: not given
   std::optional<double> pass_band;
+  double simplify_ratio = 1;             ///< of the triangles
+  std::uint64_t simplify_triangles = 0;  ///< 0: by the ratio
+  double max_error = 0;                  ///< 0: not given
   bool measure = false;
 };
 

@@ -45,7 +45,7 @@ void add_input(CLI::App* app, InputArguments& input, bool required) {
   add_text(app,
            {"INPUT", "",
             "Volume to read: a store, another program's Zarr, a zip of either, the URL of any of "
-            "these (https://… or s3://…), a file of a known format, FILE:/NAME for an array in it, "
+            "these (https:// or s3://), a file of a known format, FILE:/NAME for an array in it, "
             "or a folder of slices",
             "", required},
            [&path = input.path](const std::string& text) { path = text; });

@@ -221,7 +221,10 @@ def extract_options(
     return options
 
 
-def filter_options(*, min_component=0, largest=0, smooth=0, pass_band=0.1, measure=False):
+def filter_options(
+    *, min_component=0, largest=0, smooth=0, pass_band=0.1, simplify=None, max_error=None,
+    measure=False, threads=0,
+):
     """What is done to a mesh on its way to a file or to memory."""
     options = _isobrick.MeshFilterOptions()
     options.min_component = integer(min_component, "min_component", 0)
@@ -232,6 +235,20 @@ def filter_options(*, min_component=0, largest=0, smooth=0, pass_band=0.1, measu
     options.pass_band = number(pass_band, "pass_band")
     if not 0 < options.pass_band <= 0.8:
         raise UsageError(f"pass_band must be above 0 and at most 0.8, not {options.pass_band}")
+    if hasattr(simplify, "__index__") and simplify > 1:
+        options.simplify_triangles = integer(simplify, "simplify")
+    elif simplify is not None:
+        options.simplify_ratio = number(simplify, "simplify")
+        if not 0 < options.simplify_ratio <= 1:
+            raise UsageError(
+                "simplify must be a ratio above 0 and at most 1, or a number of triangles, not "
+                f"{simplify!r}"
+            )
+    if max_error is not None:
+        options.max_error = number(max_error, "max_error")
+        if not 0 < options.max_error < float("inf"):
+            raise UsageError(f"max_error must be a length above 0, not {max_error!r}")
+    options.threads = thread_count(threads)
     options.measure = bool(measure)
     return options
 

@@ -125,7 +125,8 @@ class Extractor:
 
     def extract(
         self, isovalue, *, roi=None, normals=False, inside="above", drop_degenerate=False,
-        topology="consistent", min_component=0, largest=0, smooth=0, pass_band=0.1, memory=2**30,
+        topology="consistent", min_component=0, largest=0, smooth=0, pass_band=0.1,
+        simplify=None, max_error=None, memory=2**30,
         threads=0, progress=None,
     ):
         """The surface of an isovalue as a `Mesh`, or a `DeviceMesh` of an array on a device.
@@ -146,7 +147,7 @@ class Extractor:
         topology : "consistent" or "trilinear"
             How the surface passes where the corners of a cell allow several ways: by a rule for
             faces, or as the trilinear interpolant does; not on a device.
-        min_component, largest, smooth, pass_band
+        min_component, largest, smooth, pass_band, simplify, max_error
             Filters of the mesh, as of `Volume.extract`; not on a device.
         memory : int or str
             Budget in bytes, or a text such as "512M", for all but the array and the mesh. It does
@@ -160,6 +161,7 @@ class Extractor:
         """
         filters = filter_options(
             min_component=min_component, largest=largest, smooth=smooth, pass_band=pass_band,
+            simplify=simplify, max_error=max_error, threads=threads,
         )
         self._check_filters(filters)
         several = is_list(isovalue)
@@ -176,7 +178,8 @@ class Extractor:
 
     def save(
         self, path, isovalue, *, roi=None, normals=False, inside="above", drop_degenerate=False,
-        topology="consistent", min_component=0, largest=0, smooth=0, pass_band=0.1, measure=False,
+        topology="consistent", min_component=0, largest=0, smooth=0, pass_band=0.1,
+        simplify=None, max_error=None, measure=False,
         memory=2**30, threads=0, progress=None, force=False, quantize=False,
     ):
         """Streams a surface to a mesh file, so that the mesh may be larger than memory.
@@ -186,6 +189,7 @@ class Extractor:
         """
         filters = filter_options(
             min_component=min_component, largest=largest, smooth=smooth, pass_band=pass_band,
+            simplify=simplify, max_error=max_error, threads=threads,
             measure=measure,
         )
         options = self._surface(
@@ -231,7 +235,8 @@ class Extractor:
 def extract(
     array, isovalue, *, spacing=None, origin=None, direction=None, unit=None, mask=None,
     nodata=None, stream=None, roi=None, normals=False, inside="above", drop_degenerate=False,
-    topology="consistent", min_component=0, largest=0, smooth=0, pass_band=0.1, memory=2**30,
+    topology="consistent", min_component=0, largest=0, smooth=0, pass_band=0.1,
+    simplify=None, max_error=None, memory=2**30,
     threads=0, progress=None,
 ):
     """The isosurface of an array [z, y, x] as a `Mesh`, or a `DeviceMesh` of one on a device.
@@ -244,7 +249,7 @@ def extract(
         As of `Extractor`: arrays are indexed [z, y, x]; world space is x, y, z.
     isovalue, roi, normals, inside, drop_degenerate, topology, memory, threads, progress
         As of `Extractor.extract`.
-    min_component, largest, smooth, pass_band
+    min_component, largest, smooth, pass_band, simplify, max_error
         As of `Volume.extract`.
 
     Examples
@@ -262,5 +267,6 @@ def extract(
     return extractor.extract(
         isovalue, roi=roi, normals=normals, inside=inside, drop_degenerate=drop_degenerate,
         topology=topology, min_component=min_component, largest=largest, smooth=smooth,
-        pass_band=pass_band, memory=memory, threads=threads, progress=progress,
+        pass_band=pass_band, simplify=simplify, max_error=max_error, memory=memory,
+        threads=threads, progress=progress,
     )

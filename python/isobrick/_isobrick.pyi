@@ -50,6 +50,10 @@ class MeshFilterOptions:
     largest: int
     smooth: int
     pass_band: float
+    simplify_ratio: float
+    simplify_triangles: int
+    max_error: float
+    threads: int
     measure: bool
     def any(self) -> bool: ...
 

@@ -169,7 +169,8 @@ class Volume:
 
     def extract(
         self, isovalue, *, level=0, roi=None, normals=False, inside=None, drop_degenerate=False,
-        topology="consistent", min_component=0, largest=0, smooth=0, pass_band=0.1, backend="auto",
+        topology="consistent", min_component=0, largest=0, smooth=0, pass_band=0.1,
+        simplify=None, max_error=None, backend="auto",
         memory=2**30, threads=0, gpu_memory=0, device=0, progress=None,
     ):
         """The surface of an isovalue as a `Mesh`.
@@ -200,6 +201,11 @@ class Volume:
             Iterations of smoothing that keeps the size (Taubin); open borders stay where they are.
         pass_band : float
             Of the smoothing: what varies more along the surface goes, from 0, all, to 0.8, little.
+        simplify : float or int, optional
+            A part of the triangles in (0, 1], or their number: flat parts lose more than others.
+        max_error : float, optional
+            Of the simplification: how far the mesh may be from the original, in `unit`. Without
+            `simplify`: as few triangles as this permits.
         backend : "auto", "cpu" or "cuda"
             What makes the surface; the mesh is the same.
         memory, gpu_memory : int or str
@@ -216,6 +222,7 @@ class Volume:
         )
         filters = filter_options(
             min_component=min_component, largest=largest, smooth=smooth, pass_band=pass_band,
+            simplify=simplify, max_error=max_error, threads=threads,
         )
         if is_list(isovalue):
             return self._extract_several(isovalue, request, filters)
@@ -235,7 +242,8 @@ class Volume:
     def save_mesh(
         self, path, isovalue, *, level=0, roi=None, normals=False, inside=None,
         drop_degenerate=False, topology="consistent", min_component=0, largest=0, smooth=0,
-        pass_band=0.1, measure=False, backend="auto", memory=2**30, threads=0, gpu_memory=0, device=0,
+        pass_band=0.1, simplify=None, max_error=None, measure=False, backend="auto",
+        memory=2**30, threads=0, gpu_memory=0, device=0,
         progress=None, force=False, quantize=False,
     ):
         """Streams a surface to a mesh file, so that volume and mesh may be larger than memory.
@@ -246,6 +254,7 @@ class Volume:
         """
         filters = filter_options(
             min_component=min_component, largest=largest, smooth=smooth, pass_band=pass_band,
+            simplify=simplify, max_error=max_error, threads=threads,
             measure=measure,
         )
         options = self._surface(

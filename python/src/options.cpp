@@ -63,6 +63,10 @@ void bind_mesh_filter_options(py::module_& module) {
       .def_readwrite("largest", &MeshFilterOptions::largest)
       .def_readwrite("smooth", &MeshFilterOptions::smooth)
       .def_readwrite("pass_band", &MeshFilterOptions::pass_band)
+      .def_readwrite("simplify_ratio", &MeshFilterOptions::simplify_ratio)
+      .def_readwrite("simplify_triangles", &MeshFilterOptions::simplify_triangles)
+      .def_readwrite("max_error", &MeshFilterOptions::max_error)
+      .def_readwrite("threads", &MeshFilterOptions::threads)
       .def_readwrite("measure", &MeshFilterOptions::measure)
       .def("any", &MeshFilterOptions::any);
 }

@@ -147,6 +147,25 @@ TEST_F(Filter, SaysThatNoComponentIsLeft) {
   EXPECT_NE(read_file(path("e.ply")).find("element vertex 0"), std::string::npos);
 }
 
+TEST_F(Filter, Simplifies) {
+  const nlohmann::json whole = extract(store_, "127.5", "whole.ply", {});
+  const auto all = whole["triangles"].get<double>();
+  for (const char* goal : {"0.25", "25%"}) {
+    const nlohmann::json part = extract(store_, "127.5", "part.ply", {"--simplify", goal});
+    EXPECT_NEAR(part["triangles"].get<double>(), all / 4, 0.05 * all) << goal;
+  }
+  const nlohmann::json count = extract(store_, "127.5", "count.ply", {"--simplify", "3k"});
+  EXPECT_LE(count["triangles"].get<double>(), 3300);
+  EXPECT_LT(extract(store_, "127.5", "near.stl", {"--max-error", "0.2"})["triangles"].get<double>(),
+            all);
+  extract(store_, "127.5", "one.ply", {"--simplify", "1"});
+  EXPECT_EQ(read_file(path("one.ply")), read_file(path("whole.ply")));
+  for (const char* wrong : {"0", "1.5", "-0.1", "120%", "nan", "0.0"})
+    expect_refused(refused({"--simplify", wrong}), 2, {wrong});
+  for (const char* wrong : {"0", "-1", "nan", "inf"})
+    expect_refused(refused({"--max-error", wrong}), 2, {wrong});
+}
+
 TEST_F(Filter, DrawsTheFilteredSurface) {
   const Arguments words{"extract", path("noise.zarr"), "--isovalue", "250.5", "--size", "64x64"};
   const auto draw = [&](const std::string& name, const Arguments& more) {

@@ -1,0 +1,118 @@
+#include "filters/triangle_groups.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/vectors.h"
+
+namespace isobrick::inline v0 {
+namespace {
+
+constexpr Int3 kGrid{TriangleGroups::kCells, TriangleGroups::kCells, TriangleGroups::kCells};
+
+/// The cell of a triangle's centre.
+class CellOf {
+ public:
+  CellOf(ScratchArray<Vec3f>& positions, const MeshBounds& bounds)
+      : positions_(positions), lo_(bounds.lo) {
+    for (int axis = 0; axis < 3; ++axis) {
+      const double extent = bounds.hi[axis] - bounds.lo[axis];
+      scale_[axis] = extent > 0 ? TriangleGroups::kCells / extent : 0;
+    }
+  }
+
+  std::size_t operator()(const Triangle& t) const {
+    Vec3d sum;
+    for (const std::uint32_t v : t) sum = sum + to_double(positions_[v]);
+    Int3 cell;
+    for (int axis = 0; axis < 3; ++axis) {
+      const double at = (sum[axis] / 3 - lo_[axis]) * scale_[axis];
+      cell[axis] =
+          at > 0 ? static_cast<Index>(std::min<double>(at, TriangleGroups::kCells - 1)) : 0;
+    }
+    return static_cast<std::size_t>(linear_index(cell, kGrid));
+  }
+
+ private:
+  ScratchArray<Vec3f>& positions_;
+  Vec3d lo_, scale_;
+};
+
+std::uint64_t count_in(const std::vector<std::uint64_t>& counts, Box3 box) {
+  std::uint64_t sum = 0;
+  for_each_point(box,
+                 [&](Int3 c) { sum += counts[static_cast<std::size_t>(linear_index(c, kGrid))]; });
+  return sum;
+}
+
+}  // namespace
+
+void TriangleGroups::divide(const std::vector<std::uint64_t>& counts, Box3 box,
+                            std::uint64_t max_triangles) {
+  const std::uint64_t count = count_in(counts, box);
+  if (count == 0) return;
+  const Int3 extent = box.extent();
+  int axis = 0;
+  for (int i = 1; i < 3; ++i)
+    if (extent[i] > extent[axis]) axis = i;
+  if (count <= max_triangles || extent[axis] == 1) {
+    const auto group = static_cast<std::uint32_t>(begin_.size() - 1);
+    for_each_point(box, [&](Int3 c) {
+      group_of_cell_[static_cast<std::size_t>(linear_index(c, kGrid))] = group;
+    });
+    begin_.push_back(begin_.back() + count);
+    return;
+  }
+  const auto at =
+      std::clamp<Index>(static_cast<Index>(std::lround(split_ * static_cast<double>(extent[axis]))),
+                        1, extent[axis] - 1);
+  Box3 low = box, high = box;
+  low.hi[axis] = high.lo[axis] = box.lo[axis] + at;
+  divide(counts, low, max_triangles);
+  divide(counts, high, max_triangles);
+}
+
+void TriangleGroups::sort(ScratchArray<Vec3f>& positions, const MeshBounds& bounds,
+                          ScratchArray<Triangle>& triangles, std::uint64_t max_triangles,
+                          const std::function<void()>& check_cancelled) {
+  const CellOf cell_of(positions, bounds);
+  std::vector<std::uint64_t> counts(static_cast<std::size_t>(volume(kGrid)));
+  triangles.for_each_run([&](std::span<const Triangle> run, std::uint64_t) {
+    check_cancelled();
+    for (const Triangle& t : run) ++counts[cell_of(t)];
+  });
+  begin_.assign(1, 0);
+  group_of_cell_.assign(counts.size(), 0);
+  divide(counts, {{0, 0, 0}, kGrid}, max_triangles);
+  sorted_.clear();
+  sorted_.resize(triangles.size());
+  std::vector<std::uint64_t> next(begin_.begin(), begin_.end() - 1);
+  triangles.for_each_run([&](std::span<const Triangle> run, std::uint64_t) {
+    check_cancelled();
+    for (const Triangle& t : run) sorted_.edit(next[group_of_cell_[cell_of(t)]]++) = t;
+  });
+  triangles.clear();
+}
+
+TriangleGroup TriangleGroups::load(std::size_t group, ScratchArray<Vec3f>& positions) {
+  TriangleGroup loaded;
+  loaded.triangles.reserve(static_cast<std::size_t>(size(group)));
+  sorted_.for_each_run(begin_[group], begin_[group + 1],
+                       [&](std::span<const Triangle> run, std::uint64_t) {
+                         loaded.triangles.insert(loaded.triangles.end(), run.begin(), run.end());
+                       });
+  for (const Triangle& t : loaded.triangles)
+    loaded.vertices.insert(loaded.vertices.end(), t.begin(), t.end());
+  std::sort(loaded.vertices.begin(), loaded.vertices.end());
+  loaded.vertices.erase(std::unique(loaded.vertices.begin(), loaded.vertices.end()),
+                        loaded.vertices.end());
+  for (const std::uint32_t v : loaded.vertices) loaded.positions.push_back(positions[v]);
+  for (Triangle& t : loaded.triangles)
+    for (std::uint32_t& v : t)
+      v = static_cast<std::uint32_t>(
+          std::lower_bound(loaded.vertices.begin(), loaded.vertices.end(), v) -
+          loaded.vertices.begin());
+  return loaded;
+}
+
+}  // namespace isobrick
