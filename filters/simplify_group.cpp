@@ -16,6 +16,8 @@ constexpr double kAnyError = 1e10;
 /// Errors that are tried, each half of the one before, and attempts with each.
 constexpr int kErrorSteps = 6;
 constexpr int kMaxRounds = 8;
+/// How much farther than the quadric error a place may move where no distance is given.
+constexpr double kMaxExcess = 4;
 
 /// The square of the distance from a point to a triangle: Ericson, Real-time collision detection,
 /// 2005, section 5.1.5.
@@ -164,6 +166,22 @@ void freeze_around(const TriangleGroup& group, const std::vector<std::size_t>& t
       if (is_near[v]) is_frozen[i] = true;
 }
 
+/// The simplification to a number of triangles in which places stay that would move much farther
+/// than the quadrics say: ends of thin sheets, whose error is lost in that of their faces.
+SimplifiedGroup simplify_freely(const TriangleGroup& group, std::uint64_t target, double scale) {
+  std::vector<bool> is_frozen(group.triangles.size());
+  SimplifiedGroup result = simplify_rest(group, is_frozen, target, kAnyError, scale);
+  const double distance = kMaxExcess * result.quadric_error;
+  for (int round = 0; round < kMaxRounds; ++round) {
+    const std::vector<std::size_t> far =
+        far_triangles(group.positions, group.triangles, result.triangles, distance);
+    if (far.empty()) break;
+    freeze_around(group, far, is_frozen);
+    result = simplify_rest(group, is_frozen, target, kAnyError, scale);
+  }
+  return result;
+}
+
 /// The simplification by an error in which what exceeds the distance stays; the whole group where
 /// `most` triangles or more would be left.
 SimplifiedGroup simplify_within(const TriangleGroup& group, const GroupTarget& target, double error,
@@ -211,8 +229,9 @@ SimplifiedGroup simplify(const TriangleGroup& group, const GroupTarget& target) 
   const double scale = meshopt_simplifyScale(reinterpret_cast<const float*>(group.positions.data()),
                                              group.positions.size(), sizeof(Vec3f));
   if (!(scale > 0)) return whole;
-  if (!std::isfinite(target.max_distance))
+  if (target.is_estimate)
     return simplify_rest(group, std::vector<bool>(all.size()), target.triangles, kAnyError, scale);
+  if (!std::isfinite(target.max_distance)) return simplify_freely(group, target.triangles, scale);
   // The quadric error does not bound distances. With less of it fewer places exceed the distance
   // and stay as they are, so less error may leave fewer triangles.
   SimplifiedGroup best = whole;

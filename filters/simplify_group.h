@@ -21,6 +21,7 @@ struct GroupTarget {
   /// No sample of the group's surface may end farther than this from the simplified surface; world
   /// units. Infinite: anywhere.
   double max_distance = 0;
+  bool is_estimate = false;  ///< distances do not matter
 };
 
 /// The triangles that are left and how far the quadrics say that they lie from the group: Garland &

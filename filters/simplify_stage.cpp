@@ -22,6 +22,9 @@ constexpr std::size_t kGroupsAtOnce = 4;
 constexpr std::uint64_t kGroupBytes = kGroupTriangles * 200;
 /// Where boxes are divided in each pass: no border of a pass is one of another.
 constexpr std::array<double, 3> kSplits{0.5, 0.37, 0.63};
+/// Of the way to the goal, on a logarithmic scale, where each pass ends. Were the first to go all
+/// the way, the borders of its groups would have the triangles that their insides lack.
+constexpr std::array<double, 3> kGoals{0.4, 0.75, 1};
 /// Of the permitted error, the part of each pass: errors add up.
 constexpr std::array<double, 3> kErrorShares{0.5, 0.25, 0.25};
 constexpr double kAnyDistance = std::numeric_limits<double>::infinity();
@@ -50,7 +53,7 @@ ErrorCurve curve_of(TriangleGroup group, double least) {
   double error = 0;
   while (static_cast<double>(group.triangles.size()) > least) {
     const std::uint64_t before = group.triangles.size();
-    SimplifiedGroup half = simplify(group, {before / 2, kAnyDistance});
+    SimplifiedGroup half = simplify(group, {before / 2, kAnyDistance, true});
     if (half.triangles.size() >= before) break;
     group.triangles = std::move(half.triangles);
     error = std::max(error, half.quadric_error);
@@ -177,23 +180,26 @@ void SimplifyStage::run_pass(TriangleGroups& groups, const std::vector<std::uint
 }
 
 void SimplifyStage::simplify_all() {
-  const std::uint64_t wanted = target();
+  const std::uint64_t goal = target();
+  const auto first = static_cast<double>(mesh_.triangles().size());
+  const double ratio = static_cast<double>(goal) / first;
   const bool has_limit = simplification_.max_error > 0;
   for (std::size_t pass = 0; pass < kSplits.size(); ++pass) {
     const std::uint64_t all = mesh_.triangles().size();
-    if (all <= wanted) break;
+    if (all <= goal) break;
     TriangleGroups groups(place_, sorted_memory_, kSplits[pass]);
     groups.sort(mesh_.positions(), bounds_, mesh_.triangles(), kGroupTriangles,
                 [this] { check_cancelled(); });
-    const bool is_last = groups.count() <= 1;
-    const bool has_plan = pass == 0 && !is_last && wanted > 0;
     sorted_bytes_ = std::max(sorted_bytes_, groups.file_bytes());
+    // One group has no borders that another pass could simplify.
+    const bool is_last = groups.count() == 1 || pass + 1 == kSplits.size();
+    const std::uint64_t wanted =
+        is_last || goal == 0 ? goal : rounded(first * std::pow(ratio, kGoals[pass]));
+    const bool has_plan = groups.count() > 1 && wanted > 0;
     progress().begin("simplifying", (has_plan ? 2 : 1) * all * sizeof(Triangle));
-    std::vector<std::uint64_t> targets;
-    if (has_plan) targets = plan_targets(groups, wanted);
-    for (std::size_t i = targets.size(); i < groups.count(); ++i)
-      targets.push_back(rounded(static_cast<double>(groups.size(i)) * static_cast<double>(wanted) /
-                                static_cast<double>(all)));
+    const std::vector<std::uint64_t> targets =
+        has_plan ? plan_targets(groups, wanted)
+                 : std::vector<std::uint64_t>(groups.count(), wanted);
     const double share = is_last && pass == 0 ? 1 : kErrorShares[pass];
     run_pass(groups, targets, has_limit ? share * simplification_.max_error : kAnyDistance);
     progress().end();
