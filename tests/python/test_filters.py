@@ -117,3 +117,17 @@ def test_what_makes_no_sense_is_refused(field, arguments, message):
 def test_types_are_checked(field):
     with pytest.raises(TypeError, match="largest must be an integer"):
         isobrick.extract(field, 0, largest=1.5)
+
+
+def test_simplified_meshes():
+    z, y, x = np.mgrid[-1:1:64j, -1:1:64j, -1:1:64j]
+    field = (1 - np.sqrt(x**2 + y**2 + z**2)).astype("f4")
+    whole = isobrick.extract(field, 0.3)
+    tenth = isobrick.extract(field, 0.3, simplify=0.1)
+    assert len(tenth.faces) == pytest.approx(0.1 * len(whole.faces), rel=0.05)
+    assert tenth.measure().euler_number == 2 and tenth.measure().open_sides == 0
+    assert len(isobrick.extract(field, 0.3, simplify=2000).faces) == pytest.approx(2000, rel=0.05)
+    assert len(isobrick.extract(field, 0.3, max_error=0.5).faces) < len(whole.faces)
+    for wrong in ({"simplify": 0}, {"simplify": 1.5}, {"simplify": -0.1}, {"max_error": 0}):
+        with pytest.raises(isobrick.UsageError, match=next(iter(wrong))):
+            isobrick.extract(field, 0.3, **wrong)
