@@ -29,6 +29,7 @@ struct ExtractArguments {
   std::optional<bool> normals;  ///< nothing: where the format holds them
   bool drop_degenerate = false;
   Topology topology = Topology::consistent;
+  bool cap = false;
   std::uint64_t memory = std::uint64_t{1} << 30;
   int threads = 0;
   IndexChoice search;

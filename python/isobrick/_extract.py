@@ -125,7 +125,7 @@ class Extractor:
 
     def extract(
         self, isovalue, *, roi=None, normals=False, inside="above", drop_degenerate=False,
-        topology="consistent", memory=2**30, threads=0, progress=None,
+        topology="consistent", cap=False, memory=2**30, threads=0, progress=None,
     ):
         """The surface of an isovalue as a `Mesh`, or a `DeviceMesh` of an array on a device.
 
@@ -145,6 +145,9 @@ class Extractor:
         topology : "consistent" or "trilinear"
             How the surface passes where the corners of a cell allow several ways: by a rule for
             faces, or as the trilinear interpolant does; not on a device.
+        cap : bool
+            Closes the surface at the border and around missing samples; neither on a device nor
+            with `drop_degenerate`.
         memory : int or str
             Budget in bytes, or a text such as "512M", for all but the array and the mesh. It does
             not bound device memory.
@@ -159,7 +162,7 @@ class Extractor:
         requests = [
             self._surface(
                 one, roi=roi, normals=normals, inside=inside, drop_degenerate=drop_degenerate,
-                topology=topology, memory=memory, threads=threads, progress=progress,
+                topology=topology, cap=cap, memory=memory, threads=threads, progress=progress,
             )
             for one in (isovalue if several else [isovalue])
         ]
@@ -169,7 +172,8 @@ class Extractor:
 
     def save(
         self, path, isovalue, *, roi=None, normals=False, inside="above", drop_degenerate=False,
-        topology="consistent", memory=2**30, threads=0, progress=None, force=False, quantize=False,
+        topology="consistent", cap=False, memory=2**30, threads=0, progress=None, force=False,
+        quantize=False,
     ):
         """Streams a surface to a mesh file, so that the mesh may be larger than memory.
 
@@ -178,7 +182,7 @@ class Extractor:
         """
         options = self._surface(
             isovalue, roi=roi, normals=normals, inside=inside, drop_degenerate=drop_degenerate,
-            topology=topology, memory=memory, threads=threads, progress=progress,
+            topology=topology, cap=cap, memory=memory, threads=threads, progress=progress,
         )
         file = mesh_file_options(force=force, quantize=quantize, threads=threads, memory=memory)
         if self._on_device:
@@ -212,7 +216,7 @@ class Extractor:
 def extract(
     array, isovalue, *, spacing=None, origin=None, direction=None, unit=None, mask=None,
     nodata=None, stream=None, roi=None, normals=False, inside="above", drop_degenerate=False,
-    topology="consistent", memory=2**30, threads=0, progress=None,
+    topology="consistent", cap=False, memory=2**30, threads=0, progress=None,
 ):
     """The isosurface of an array [z, y, x] as a `Mesh`, or a `DeviceMesh` of one on a device.
 
@@ -222,7 +226,7 @@ def extract(
     ----------
     array, spacing, origin, direction, unit, mask, nodata, stream
         As of `Extractor`: arrays are indexed [z, y, x]; world space is x, y, z.
-    isovalue, roi, normals, inside, drop_degenerate, topology, memory, threads, progress
+    isovalue, roi, normals, inside, drop_degenerate, topology, cap, memory, threads, progress
         As of `Extractor.extract`.
 
     Examples
@@ -239,5 +243,5 @@ def extract(
     )
     return extractor.extract(
         isovalue, roi=roi, normals=normals, inside=inside, drop_degenerate=drop_degenerate,
-        topology=topology, memory=memory, threads=threads, progress=progress,
+        topology=topology, cap=cap, memory=memory, threads=threads, progress=progress,
     )

@@ -169,8 +169,8 @@ class Volume:
 
     def extract(
         self, isovalue, *, level=0, roi=None, normals=False, inside=None, drop_degenerate=False,
-        topology="consistent", backend="auto", memory=2**30, threads=0, gpu_memory=0, device=0,
-        progress=None,
+        topology="consistent", cap=False, backend="auto", memory=2**30, threads=0, gpu_memory=0,
+        device=0, progress=None,
     ):
         """The surface of an isovalue as a `Mesh`.
 
@@ -192,6 +192,9 @@ class Volume:
         topology : "consistent" or "trilinear"
             How the surface passes where the corners of a cell allow several ways: by a rule for
             faces, or as the trilinear interpolant does; on the CPU.
+        cap : bool
+            Closes the surface at the border and around missing samples; on the CPU, and not with
+            `drop_degenerate`.
         backend : "auto", "cpu" or "cuda"
             What makes the surface; the mesh is the same.
         memory, gpu_memory : int or str
@@ -203,8 +206,9 @@ class Volume:
         """
         request = dict(
             level=level, roi=roi, normals=normals, inside=inside,
-            drop_degenerate=drop_degenerate, topology=topology, backend=backend, memory=memory,
-            threads=threads, gpu_memory=gpu_memory, device=device, progress=progress,
+            drop_degenerate=drop_degenerate, topology=topology, cap=cap, backend=backend,
+            memory=memory, threads=threads, gpu_memory=gpu_memory, device=device,
+            progress=progress,
         )
         if is_list(isovalue):
             return self._extract_several(isovalue, request)
@@ -223,8 +227,8 @@ class Volume:
 
     def save_mesh(
         self, path, isovalue, *, level=0, roi=None, normals=False, inside=None,
-        drop_degenerate=False, topology="consistent", backend="auto", memory=2**30, threads=0,
-        gpu_memory=0, device=0, progress=None, force=False, quantize=False,
+        drop_degenerate=False, topology="consistent", cap=False, backend="auto", memory=2**30,
+        threads=0, gpu_memory=0, device=0, progress=None, force=False, quantize=False,
     ):
         """Streams a surface to a mesh file, so that volume and mesh may be larger than memory.
 
@@ -233,8 +237,8 @@ class Volume:
         """
         options = self._surface(
             isovalue, progress=progress, level=level, roi=roi, normals=normals, inside=inside,
-            drop_degenerate=drop_degenerate, topology=topology, backend=backend, memory=memory,
-            threads=threads, gpu_memory=gpu_memory, device=device,
+            drop_degenerate=drop_degenerate, topology=topology, cap=cap, backend=backend,
+            memory=memory, threads=threads, gpu_memory=gpu_memory, device=device,
         )
         file = mesh_file_options(force=force, quantize=quantize, threads=threads, memory=memory)
         with reporting(progress) as report:
