@@ -145,9 +145,20 @@ bool exists(const ExistingCells& cells, Index x, Index y, Index z) {
   return cells.at(static_cast<int>(y), static_cast<int>(z)) >> (x + 1) & 1;
 }
 
+/// Whether a cell that exists has a border face at its corner. Only the cells around the sample
+/// matter, because a face there lies between two of them.
+bool has_border_face(const ExistingCells& cells, Int3 cell, int corner) {
+  if (!exists(cells, cell.x, cell.y, cell.z)) return false;
+  for (int axis = 0; axis < 3; ++axis) {
+    Int3 other = cell;
+    other[axis] += corner >> axis & 1 ? 1 : -1;
+    if (!exists(cells, other.x, other.y, other.z)) return true;
+  }
+  return false;
+}
+
 /// Lists the samples of the faces in the order of their places and numbers the tile's own. The
-/// first tile that has a cell at a sample makes its vertex: it has a border face there, or all of
-/// its samples are looked at for NaN.
+/// first tile that has a border face at a sample makes its vertex.
 void list_vertices(const KernelContext& context, bool unwelded, TileState& tile) {
   TileCap& cap = *tile.cap;
   for (int row = 0; row < kTileRows; ++row) {
@@ -156,8 +167,8 @@ void list_vertices(const KernelContext& context, bool unwelded, TileState& tile)
       const int x = std::countr_zero(word), y = row % kTileSamples, z = row / kTileSamples;
       SampleVertex vertex{static_cast<std::uint32_t>(x | y << 6 | z << 12), 0, SampleVertex::kOwn};
       if (!unwelded && is_shared(context, tile.shape, vertex.place))
-        vertex.owner = first_tile_at(tile.work.tile, {x, y, z}, [&](Int3 cell, int) {
-          return exists(cap.cells, cell.x, cell.y, cell.z);
+        vertex.owner = first_tile_at(tile.work.tile, {x, y, z}, [&](Int3 cell, int corner) {
+          return has_border_face(cap.cells, cell, corner);
         });
       if (vertex.owner == SampleVertex::kOwn) vertex.number = tile.vertices + cap.own++;
       cap.vertices.resize(cap.vertices.size() + 1);

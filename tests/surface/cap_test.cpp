@@ -98,7 +98,7 @@ constexpr Topology kTopologies[] = {Topology::consistent, Topology::trilinear};
 constexpr Inside kInsides[] = {Inside::above, Inside::below};
 
 TYPED_TEST(CapOf, NoiseIsAClosedManifold) {
-  const auto field = noise<TypeParam>({67, 40, 36}, 7, 1);
+  const auto field = noise<TypeParam>({66, 34, 20}, 7, 1);
   for (const Topology topology : kTopologies)
     for (const Inside inside : kInsides) {
       const Request request{.isovalue = 3, .inside = inside, .topology = topology, .cap = true};
@@ -106,7 +106,7 @@ TYPED_TEST(CapOf, NoiseIsAClosedManifold) {
       EXPECT_TRUE(is_closed_manifold(mesh));
       EXPECT_EQ(unused_vertices(mesh), 0u);
       const auto caps = cap_triangles(field, request);
-      EXPECT_GT(caps.size(), 1000u);
+      EXPECT_GT(caps.size(), 500u);
       for (const auto& triangle : caps) ASSERT_TRUE(lies_on_border(triangle, field.box()));
     }
 }
@@ -297,7 +297,8 @@ Field<float> sphere(Int3 extent, Vec3d centre, double radius) {
 }
 
 TEST(Cap, OfASphereThatTheBorderCuts) {
-  const double radius = 20, height = 8;  // of the part beyond x = 0
+  // The height of the part beyond x = 0. No sample of that plane lies on the sphere.
+  const double radius = 20, height = 8.5;
   const auto field = sphere({60, 60, 60}, {radius - height, 30, 30}, radius);
   const Mesh mesh = extract(field, {.normals = true, .cap = true});
   EXPECT_TRUE(is_closed_manifold(mesh));
