@@ -9,13 +9,14 @@ namespace {
 /// Looks at the range of every block.
 class RangeSearch final : public BlockSearch {
  public:
-  RangeSearch(const StoreReader& store, int level) : store_(store), level_(level) {}
+  RangeSearch(const StoreReader& store, int level, const std::optional<CapSearch>& cap = {})
+      : store_(store), level_(level), cap_(cap) {}
 
   void append_tiles(Int3 chunk, Box3 box, std::span<const double> isovalues,
                     std::span<std::vector<TileWork>> tiles) override {
     const RangeTable table = read(chunk);
     for (std::size_t i = 0; i < isovalues.size(); ++i)
-      append_tiles(table, box, isovalues[i], tiles[i]);
+      append_tiles(table, box, isovalues[i], tiles[i], cap_);
   }
   std::uint64_t range_bytes() const override { return bytes_read_; }
 
@@ -31,14 +32,18 @@ class RangeSearch final : public BlockSearch {
     return table;
   }
   static void append_tiles(const RangeTable& table, Box3 box, double isovalue,
-                           std::vector<TileWork>& tiles) {
-    append_active_tiles<double>(table.box, table.ranges, isovalue, tiles);
+                           std::vector<TileWork>& tiles, const std::optional<CapSearch>& cap = {}) {
+    if (cap)
+      append_capped_tiles<double>(table.box, table.ranges, isovalue, *cap, tiles);
+    else
+      append_active_tiles<double>(table.box, table.ranges, isovalue, tiles);
     std::erase_if(tiles, [&](const TileWork& work) { return !box.contains(work.tile); });
   }
 
  private:
   const StoreReader& store_;
   int level_;
+  std::optional<CapSearch> cap_;
   std::uint64_t bytes_read_ = 0;
 };
 
@@ -69,9 +74,9 @@ class SparseSearch final : public BlockSearch {
 
 }  // namespace
 
-std::unique_ptr<BlockSearch> make_block_search(const StoreReader& store, int level,
-                                               SearchMethod by) {
-  if (!by.kind) return std::make_unique<RangeSearch>(store, level);
+std::unique_ptr<BlockSearch> make_block_search(const StoreReader& store, int level, SearchMethod by,
+                                               const std::optional<CapSearch>& cap) {
+  if (!by.kind || cap) return std::make_unique<RangeSearch>(store, level, cap);
   if (by.only_if_few) return std::make_unique<SparseSearch>(store, level, *by.kind);
   return std::make_unique<IndexSearch>(store, level, *by.kind);
 }

@@ -9,6 +9,7 @@
 #include <isobrick/index_kind.h>
 #include <isobrick/store_reader.h>
 #include "core/tile.h"
+#include "index/active_tiles.h"
 
 namespace isobrick::inline v0 {
 
@@ -37,9 +38,10 @@ class BlockSearch {
 };
 
 /// All of them give the same surface. An index works in parallel in the caller's
-/// TBB arena, in no more than block_search_bytes().
-std::unique_ptr<BlockSearch> make_block_search(const StoreReader& store, int level,
-                                               SearchMethod by);
+/// TBB arena, in no more than block_search_bytes(). With `cap` also the blocks that capped surfaces
+/// need, which only ranges find.
+std::unique_ptr<BlockSearch> make_block_search(const StoreReader& store, int level, SearchMethod by,
+                                               const std::optional<CapSearch>& cap = {});
 
 /// Memory that such a search takes with so many threads, beyond a range chunk.
 std::uint64_t block_search_bytes(const StoreReader& store, int level, SearchMethod by, int threads);

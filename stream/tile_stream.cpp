@@ -25,8 +25,8 @@ void append_needed_bricks(const Lattice& lattice, const TileWork& work, Index re
 }  // namespace
 
 TileStream::TileStream(const StoreReader& store, int level, std::vector<double> isovalues, Box3 roi,
-                       SearchMethod by)
-    : search_(make_block_search(store, level, by)),
+                       SearchMethod by, const std::optional<CapSearch>& cap)
+    : search_(make_block_search(store, level, by, cap)),
       isovalues_(std::move(isovalues)),
       tiles_of_(isovalues_.size()) {
   const Lattice& lattice = store.info().levels[static_cast<std::size_t>(level)].lattice;

@@ -17,9 +17,10 @@ namespace isobrick::inline v0 {
 /// Tiles that the caller lists are all in memory.
 class TileStream {
  public:
-  /// Tiles without a cell in `roi` (samples) are left out. `by` is the search method.
+  /// Tiles without a cell in `roi` (samples) are left out. `by` is the search method. With `cap`
+  /// also the tiles that capped surfaces need.
   TileStream(const StoreReader& store, int level, std::vector<double> isovalues, Box3 roi,
-             SearchMethod by = {});
+             SearchMethod by = {}, const std::optional<CapSearch>& cap = {});
   TileStream(const StoreReader& store, int level, double isovalue, Box3 roi, SearchMethod by = {})
       : TileStream(store, level, std::vector<double>{isovalue}, roi, by) {}
   /// These tiles, as if they were active at one isovalue.

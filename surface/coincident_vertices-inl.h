@@ -22,8 +22,8 @@ template <class T>
 void write_coincident_vertices(const KernelContext& context, const TileState& tile,
                                Vec3f* positions, Vec3f* normals) {
   const ScalarVertices<T> scalar{context, tile};
-  for (const CoincidentVertex& vertex : tile.coincident->vertices) {
-    if (vertex.owner != CoincidentVertex::kOwn) continue;
+  for (const SampleVertex& vertex : tile.coincident->vertices) {
+    if (vertex.owner != SampleVertex::kOwn) continue;
     scalar.write_sample(vertex.place, positions++, normals);
     if (normals) ++normals;
   }

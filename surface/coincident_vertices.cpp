@@ -1,28 +1,17 @@
 #include "surface/coincident_vertices.h"
 
-#include <algorithm>
 #include <bit>
 #include <cstring>
 
-#include "core/morton.h"
 #include "core/threshold.h"
 #include "surface/patched_cells.h"
+#include "surface/sample_vertices.h"
 
 namespace isobrick::inline v0 {
 namespace {
 
-constexpr int kLast = kTileSamples - 1;
-
-/// Tiles around a tile: offset (x, y, z), each in −1 … 1, and back.
-constexpr std::uint8_t neighbour(Int3 offset) {
-  return static_cast<std::uint8_t>(offset.x + 1 + 3 * (offset.y + 1 + 3 * (offset.z + 1)));
-}
-constexpr Int3 offset_of(std::uint8_t neighbour) {
-  return {neighbour % 3 - 1, neighbour / 3 % 3 - 1, neighbour / 9 - 1};
-}
-
 constexpr bool on_planes(std::uint32_t place) {
-  const auto outer = [](std::uint32_t i) { return i == 0 || i == kLast; };
+  const auto outer = [](std::uint32_t i) { return i == 0 || i == kTileSamples - 1; };
   return outer(place & 63) || outer(place >> 6 & 63) || outer(place >> 12);
 }
 
@@ -75,24 +64,12 @@ class CoincidentOwner {
 
   /// The neighbour, for a coincident vertex that this tile has a kept triangle at.
   std::uint8_t find(Int3 p) const {
-    std::uint8_t owner = CoincidentVertex::kOwn;
-    std::uint64_t first = morton_encode(tile_.work.tile);
-    for (int corner = 0; corner < 8; ++corner) {
-      const Int3 cell = p - Int3{corner & 1, corner >> 1 & 1, corner >> 2};
-      const std::uint8_t of = neighbour({side(cell.x), side(cell.y), side(cell.z)});
-      if (of == CoincidentVertex::kOwn || of == owner || !exists(cell)) continue;
-      const std::uint64_t code = morton_encode(tile_.work.tile + offset_of(of));
-      if (code < first && has_triangle(cell, corner)) {
-        first = code;
-        owner = of;
-      }
-    }
-    return owner;
+    return first_tile_at(tile_.work.tile, p, [&](Int3 cell, int corner) {
+      return exists(cell) && has_triangle(cell, corner);
+    });
   }
 
  private:
-  static Index side(Index cell) { return cell < 0 ? -1 : cell < kTileEdge ? 0 : 1; }
-
   bool exists(Int3 cell) const {
     const Int3 lo = tile_.shape.origin + cell;
     return context_.roi.contains(lo) && context_.roi.contains(lo + Int3{1, 1, 1});
@@ -141,10 +118,9 @@ void list_used(const KernelContext& context, bool unwelded, TileState& tile) {
     coincident.first[row] = static_cast<std::uint32_t>(coincident.vertices.size());
     for (std::uint64_t word = coincident.used[row]; word; word &= word - 1) {
       const int x = std::countr_zero(word), y = row % kTileSamples, z = row / kTileSamples;
-      CoincidentVertex vertex{static_cast<std::uint32_t>(x | y << 6 | z << 12), 0,
-                              CoincidentVertex::kOwn};
+      SampleVertex vertex{static_cast<std::uint32_t>(x | y << 6 | z << 12), 0, SampleVertex::kOwn};
       if (!unwelded && on_planes(vertex.place)) vertex.owner = owner.find({x, y, z});
-      if (vertex.owner == CoincidentVertex::kOwn)
+      if (vertex.owner == SampleVertex::kOwn)
         vertex.number = tile.edge_vertices + tile.inner_vertices + coincident.own++;
       coincident.vertices.resize(coincident.vertices.size() + 1);
       coincident.vertices[coincident.vertices.size() - 1] = vertex;
@@ -171,38 +147,11 @@ void count_coincident(ScalarType type, const KernelContext& context, bool unweld
 }
 
 void publish_coincident(TileState& tile) {
-  PodBuffer<CoincidentFace>& published = tile.boundary->coincident;
-  const auto for_each_shared = [&](auto&& f) {
-    for (const CoincidentVertex& vertex : tile.coincident->vertices)
-      if (vertex.owner == CoincidentVertex::kOwn && on_planes(vertex.place)) f(vertex);
-  };
-  std::size_t count = 0;
-  for_each_shared([&](const CoincidentVertex&) { ++count; });
-  published.clear();
-  published.reserve(count);  // no more than that: boundaries are what a budget counts
-  for_each_shared([&](const CoincidentVertex& vertex) {
-    published.resize(published.size() + 1);
-    published[published.size() - 1] = {vertex.place, vertex.number};
-  });
+  publish_samples(tile.coincident->vertices.span(), on_planes, tile.boundary->coincident);
 }
 
 void adopt_coincident(TileState& tile, const BoundaryMap& map) {
-  for (CoincidentVertex& vertex : tile.coincident->vertices) {
-    if (vertex.owner == CoincidentVertex::kOwn) {
-      vertex.number += tile.number_base;
-      continue;
-    }
-    const Int3 offset = offset_of(vertex.owner);
-    const TileBoundary& from = *map.find(tile.work.tile + offset);
-    const auto along = [&](int axis) {
-      return static_cast<std::uint32_t>((vertex.place >> 6 * axis & 63) - kTileEdge * offset[axis]);
-    };
-    const std::uint32_t place = along(0) | along(1) << 6 | along(2) << 12;
-    const CoincidentFace* found = std::lower_bound(
-        from.coincident.begin(), from.coincident.end(), place,
-        [](const CoincidentFace& coincident, std::uint32_t p) { return coincident.place < p; });
-    vertex.number = from.base + found->number;
-  }
+  adopt_samples(tile, &TileBoundary::coincident, map, tile.coincident->vertices);
 }
 
 }  // namespace isobrick

@@ -12,6 +12,7 @@
 #include <isobrick/error.h>
 #include "core/stopwatch.h"
 #include "surface/boundary_map.h"
+#include "surface/cap.h"
 #include "surface/case_rule.h"
 #include "surface/chunk_writer.h"
 #include "surface/coincident_vertices.h"
@@ -29,11 +30,11 @@ constexpr std::size_t kTilesPerThread = 8;
 
 /// Of a tile's boundary, mostly: few surfaces cross its upper x face so often that the lists of
 /// vertices there take more.
-std::uint64_t boundary_bytes_of_tile(bool drop_degenerate) {
+std::uint64_t boundary_bytes_of_tile(bool drop_degenerate, const CapBounds& cap) {
   // Any sample on a tile's six planes may be a coincident vertex.
   constexpr std::uint64_t inner = kTileSamples - 2;
   constexpr std::uint64_t planes = kTileSamples * kTileRows - inner * inner * inner;
-  return 3072 + (drop_degenerate ? planes * sizeof(CoincidentFace) : 0);
+  return 3072 + ((drop_degenerate ? planes : 0) + cap.shared) * sizeof(SharedSample);
 }
 
 /// Edges of a tile: three from each sample.
@@ -73,11 +74,19 @@ struct CpuExtractor::Impl {
     options.roi = intersect(o.roi, l.box());
     if (std::isnan(o.isovalue)) throw UsageError("the isovalue is not a number");
     if (options.roi.empty()) throw UsageError("the region of interest holds no sample");
+    check_cap(o);
     options.may_have_nan = o.may_have_nan && is_floating(l.type);
     options.drop_degenerate = o.drop_degenerate && has_coincident(l.type, o.isovalue);
-    context = {
-        o.isovalue,  world_map(o.transform, o.inside), o.normals, options.may_have_nan, l.extent,
-        options.roi, o.topology == Topology::trilinear};
+    context = {.isovalue = o.isovalue,
+               .world = world_map(o.transform, o.inside),
+               .normals = o.normals,
+               .may_have_nan = options.may_have_nan,
+               .extent = l.extent,
+               .roi = options.roi,
+               .trilinear = o.topology == Topology::trilinear,
+               .cap = o.cap,
+               .inside = o.inside,
+               .border = options.roi};
     first_tile = tile_of(options.roi.lo);
     if (sink) writer.emplace(*sink);
   }
@@ -108,6 +117,11 @@ struct CpuExtractor::Impl {
   }
 
   void count(TileState& state, const TileWork& work, const TileSamples& samples) const {
+    count(state, work, samples, context);
+  }
+
+  void count(TileState& state, const TileWork& work, const TileSamples& samples,
+             const KernelContext& kernels) const {
     state.work = work;
     state.vertices = state.triangles = 0;
     state.cells.clear();
@@ -115,19 +129,24 @@ struct CpuExtractor::Impl {
     // Another extractor may have left its own, or none.
     if (options.drop_degenerate != (state.coincident != nullptr))
       state.coincident = options.drop_degenerate ? std::make_unique<CoincidentVertices>() : nullptr;
+    if (options.cap != (state.cap != nullptr))
+      state.cap = options.cap ? std::make_unique<TileCap>() : nullptr;
     if (!shape_tile(state.shape, work.tile)) {
       state.clear_rows();
       if (state.coincident) state.coincident->clear();
+      if (state.cap) state.cap->clear();
     } else {
       if (options.may_have_nan) state.work.active_blocks = 0xff;
       gather(state, samples);
-      count_tile(lattice.type, context, state);
-      if (context.trilinear) count_patched_cells(lattice.type, context, state);
-      if (state.coincident) count_coincident(lattice.type, context, !welded(), state);
+      count_tile(lattice.type, kernels, state);
+      if (kernels.trilinear) count_patched_cells(lattice.type, kernels, state);
+      if (state.coincident) count_coincident(lattice.type, kernels, !welded(), state);
+      if (state.cap) count_cap(lattice.type, kernels, !welded(), state);
     }
     if (!state.boundary) return;
     publish_boundary(state);
     if (state.coincident) publish_coincident(state);
+    if (state.cap) publish_cap(kernels, state);
   }
 
   template <class F>
@@ -170,6 +189,7 @@ struct CpuExtractor::Impl {
     if (state.vertices == 0 && state.triangles == 0) return;
     adopt_boundaries(state, boundaries);
     if (state.coincident) adopt_coincident(state, boundaries);
+    if (state.cap) adopt_cap(state, boundaries);
     write_tile(lattice.type, context, state, mesh.positions.data() + state.vertex_base,
                options.normals ? mesh.normals.data() + state.vertex_base : nullptr,
                mesh.triangles.data() + state.triangle_base);
@@ -246,8 +266,15 @@ SurfaceReport CpuExtractor::report() const {
 Mesh& CpuExtractor::mesh() { return impl_->mesh; }
 
 MeshSize CpuExtractor::count(const TileWork& tile, const BrickLookup& bricks) const {
+  return count(tile, bricks, impl_->options.roi);
+}
+
+MeshSize CpuExtractor::count(const TileWork& tile, const BrickLookup& bricks, Box3 region) const {
   const auto state = std::make_unique<TileState>();
-  impl_->count(*state, tile, BrickSamples(impl_->lattice, bricks, impl_->options.fill_value));
+  KernelContext context = impl_->context;
+  context.border = region;
+  impl_->count(*state, tile, BrickSamples(impl_->lattice, bricks, impl_->options.fill_value),
+               context);
   return {state->vertices, state->triangles};
 }
 
@@ -269,23 +296,30 @@ MeshSize CpuExtractor::max_in_cell(Topology topology) {
 // As if every edge of a tile had a vertex and every cell a triangle: any input fits. With the
 // boundary, which waits at least until the batch is over.
 std::uint64_t CpuExtractor::workspace_bytes(ScalarType type, bool drop_degenerate,
-                                            Topology topology) {
+                                            Topology topology, const CapBounds& cap) {
   const std::uint64_t coincident =
-      sizeof(CoincidentVertices) + kTileRows * kTileSamples * sizeof(CoincidentVertex);
-  return sizeof(TileState) + boundary_bytes_of_tile(drop_degenerate) +
+      sizeof(CoincidentVertices) + kTileRows * kTileSamples * sizeof(SampleVertex);
+  // Its lists grow by halves.
+  const std::uint64_t cap_bytes =
+      cap.faces == 0
+          ? 0
+          : sizeof(TileCap) +
+                (cap.faces * sizeof(CapFace) + cap.vertices * sizeof(SampleVertex)) * 3 / 2;
+  return sizeof(TileState) + boundary_bytes_of_tile(drop_degenerate, cap) + cap_bytes +
          TileLayout::kSize * size_of(type) + kTileVolume * sizeof(ActiveCell) +
          (topology == Topology::trilinear ? kTileVolume * sizeof(PatchedCell) : 0) +
          kMaxEdges * sizeof(std::uint32_t) + (drop_degenerate ? coincident : 0);
 }
 
-std::uint64_t CpuExtractor::boundary_bytes(Int3 tiles, bool drop_degenerate) {
-  return BoundaryMap::max_size(tiles) * boundary_bytes_of_tile(drop_degenerate);
+std::uint64_t CpuExtractor::boundary_bytes(Int3 tiles, bool drop_degenerate, const CapBounds& cap) {
+  return BoundaryMap::max_size(tiles) * boundary_bytes_of_tile(drop_degenerate, cap);
 }
 
-std::uint64_t CpuExtractor::max_tile_output(bool normals, Topology topology) {
+std::uint64_t CpuExtractor::max_tile_output(bool normals, Topology topology, const CapBounds& cap) {
   const MeshSize of_cell = max_in_cell(topology);
-  return (kMaxEdges + of_cell.vertices * kTileVolume) * sizeof(Vec3f) * (normals ? 2 : 1) +
-         of_cell.triangles * kTileVolume * sizeof(Triangle);
+  return mesh_bytes({.vertices = kMaxEdges + of_cell.vertices * kTileVolume + cap.vertices,
+                     .triangles = of_cell.triangles * kTileVolume + cap.faces * kMaxFaceTriangles},
+                    normals);
 }
 
 }  // namespace isobrick

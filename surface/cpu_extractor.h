@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "surface/cap_bounds.h"
 #include "surface/surface_extractor.h"
 
 namespace isobrick::inline v0 {
@@ -62,7 +63,10 @@ class CpuExtractor final : public SurfaceExtractor {
   /// What was extracted and is not the sink's.
   Mesh& mesh();
 
-  /// Counts what extract() makes of one tile, wherever the tile comes in the order.
+  /// Counts what extract() makes of one tile, wherever the tile comes in the order. Caps lie at the
+  /// border of `region`, which may be larger than the roi.
+  MeshSize count(const TileWork& tile, const BrickLookup& bricks, Box3 region) const;
+  /// The same with caps at the border of the roi.
   MeshSize count(const TileWork& tile, const BrickLookup& bricks) const;
 
   /// Forgets all that was extracted: the next tile may be any again. Of an extractor without a
@@ -72,11 +76,12 @@ class CpuExtractor final : public SurfaceExtractor {
   /// Tiles between two hand-offs that keep `threads` busy and their caches warm.
   static std::size_t preferred_batch(int threads);
   /// Bytes of work space for one tile, with its boundary.
-  static std::uint64_t workspace_bytes(ScalarType type, bool drop_degenerate, Topology topology);
+  static std::uint64_t workspace_bytes(ScalarType type, bool drop_degenerate, Topology topology,
+                                       const CapBounds& cap = {});
   /// Bytes of finished tiles that wait for later tiles at most, mostly: of a grid of tiles.
-  static std::uint64_t boundary_bytes(Int3 tiles, bool drop_degenerate);
+  static std::uint64_t boundary_bytes(Int3 tiles, bool drop_degenerate, const CapBounds& cap = {});
   /// Bytes of output that one tile can make at most.
-  static std::uint64_t max_tile_output(bool normals, Topology topology);
+  static std::uint64_t max_tile_output(bool normals, Topology topology, const CapBounds& cap = {});
   /// Vertices within a cell and triangles that one cell can make at most.
   static MeshSize max_in_cell(Topology topology);
 

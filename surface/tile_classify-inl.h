@@ -75,7 +75,8 @@ inline std::uint64_t nan_bits(const T* samples) {
 /// their samples lie on the side of the sample that the tile's blocks share.
 template <class T>
 void classify_samples(const KernelContext& context, TileState& tile) {
-  const T threshold = Threshold<T>(context.isovalue).value;
+  const Threshold<T> limit(context.isovalue);
+  const T threshold = limit.value;
   const std::optional<T> coincident = coincident_value<T>(context.isovalue);
   const T* samples = reinterpret_cast<const T*>(tile.samples.data());
   const Int3 common = common_sample(context.extent, tile.work.tile);
@@ -99,6 +100,8 @@ void classify_samples(const KernelContext& context, TileState& tile) {
       if (tile.coincident)
         tile.coincident->at[row_index(y, z)] =
             gathered ? gathered & equal_bits(row, *coincident) : 0;
+      // Only blocks of a cap are looked at where all is below.
+      if (limit.none) tile.inside[row_index(y, z)] = 0;
     }
   }
 }

@@ -10,6 +10,7 @@
 #include <hwy/highway.h>
 
 #include "core/simd_targets.h"
+#include "surface/cap-inl.h"
 #include "surface/case_tables.h"
 #include "surface/coincident_vertices-inl.h"
 #include "surface/patched_cells-inl.h"
@@ -42,9 +43,14 @@ void Write(ScalarType type, const KernelContext& context, TileState& tile, Vec3f
       write_from(tile.edge_vertices + tile.inner_vertices, [&](Vec3f* to, Vec3f* normals_to) {
         write_coincident_vertices<T>(context, tile, to, normals_to);
       });
+    if (tile.cap_triangles() > 0)
+      write_from(tile.vertices - tile.cap->own, [&](Vec3f* to, Vec3f* normals_to) {
+        write_cap_vertices(context, tile, to, normals_to);
+      });
   });
   const CaseTables& tables = context.world.mirrored ? kMirroredCaseTables : kCaseTables;
-  Triangle* const patched = triangles + (tile.triangles - tile.patched_triangles);
+  Triangle* const cap = triangles + (tile.triangles - tile.cap_triangles());
+  Triangle* const patched = cap - tile.patched_triangles;
   if (tile.coincident && tile.coincident->matter()) {
     write_kept_triangles(tables, tile, triangles);
     write_kept_patched_triangles(context.world.mirrored, tile, patched);
@@ -52,6 +58,7 @@ void Write(ScalarType type, const KernelContext& context, TileState& tile, Vec3f
     write_triangles(tables, tile, triangles);
     if (tile.patched.size() > 0) write_patched_triangles(context.world.mirrored, tile, patched);
   }
+  if (tile.cap_triangles() > 0) write_cap_triangles(context, tile, cap);
 }
 
 }  // namespace HWY_NAMESPACE

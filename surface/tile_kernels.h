@@ -14,6 +14,9 @@ struct KernelContext {
   Int3 extent;             ///< of the volume: gradients are one-sided at its border
   Box3 roi;                ///< samples between which there are cells
   bool trilinear = false;  ///< Topology::trilinear
+  bool cap = false;        ///< closes the surface at the border
+  Inside inside = Inside::above;
+  Box3 border;  ///< samples between which cells exist for a cap: the roi, or more than that
 };
 
 // The two passes over one tile, compiled for several instruction sets; the best

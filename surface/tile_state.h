@@ -67,25 +67,26 @@ struct FaceVertex {
   std::uint32_t number;
 };
 
-/// A vertex on a coincident vertex (see coincident_vertices.h) on a tile's planes: place as in
-/// CoincidentVertex and number within the tile.
-struct CoincidentFace {
+/// A vertex on a sample on a tile's planes: place as in SampleVertex and number within the tile.
+struct SharedSample {
   std::uint32_t place, number;
 };
 
 /// What later tiles need of a finished one: the vertices on its upper planes,
-/// and those on coincident vertices on all its planes.
+/// and those on samples on all its planes.
 struct TileBoundary {
   std::uint32_t base = 0;  ///< number of the tile's first vertex in the mesh
   bool empty = true;       ///< no vertex: what follows holds anything
   /// Rows with y = 32 (by z) and rows with z = 32 (by y); numbers count from `base`.
   std::array<EdgeRow, kTileSamples> y_face, z_face;
   PodBuffer<FaceVertex> x_face_y, x_face_z;  ///< edges along y and along z at x = 32
-  PodBuffer<CoincidentFace> coincident;      ///< by place
+  PodBuffer<SharedSample> coincident;        ///< coincident vertices, by place
+  PodBuffer<SharedSample> cap;               ///< vertices of caps, by place
 };
 
-/// The vertex on a coincident vertex that triangles of a tile have corners on.
-struct CoincidentVertex {
+/// A vertex on a sample that triangles of a tile have corners on: a coincident vertex
+/// (coincident_vertices.h) or one of a cap (cap.h).
+struct SampleVertex {
   static constexpr std::uint8_t kOwn = 13;
   std::uint32_t place;  ///< x | y << 6 | z << 12
   std::uint32_t number;
@@ -96,12 +97,12 @@ struct CoincidentVertex {
 struct CoincidentVertices {
   /// Bit x: sample x is a coincident vertex. A row and a sample more than there are, always 0.
   std::uint64_t at[kTileRows + kTileSamples + 1] = {};
-  std::uint64_t used[kTileRows];   ///< bit x: a triangle of this tile has a corner on sample x
-  std::uint32_t first[kTileRows];  ///< which of `vertices` is the row's first
-  PodBuffer<CoincidentVertex> vertices;  ///< the used ones, by place
-  std::uint32_t own = 0;                 ///< of them made by this tile
-  std::uint32_t left_out = 0;            ///< triangles
-  std::uint32_t patched_left_out = 0;    ///< of them those of patched cells
+  std::uint64_t used[kTileRows];       ///< bit x: a triangle of this tile has a corner on sample x
+  std::uint32_t first[kTileRows];      ///< which of `vertices` is the row's first
+  PodBuffer<SampleVertex> vertices;    ///< the used ones, by place
+  std::uint32_t own = 0;               ///< of them made by this tile
+  std::uint32_t left_out = 0;          ///< triangles
+  std::uint32_t patched_left_out = 0;  ///< of them those of patched cells
 
   void clear() {
     vertices.clear();
@@ -109,6 +110,34 @@ struct CoincidentVertices {
   }
   /// Whether a triangle has a corner on a coincident vertex, or had before it was left out.
   bool matter() const { return vertices.size() > 0 || left_out > 0; }
+};
+
+/// The cells around a tile that exist, as rows of bits: row (y, z) and bit x + 1 for cell
+/// (x, y, z), each in −1 … 32. Cells outside of the region or with a NaN corner do not.
+struct ExistingCells {
+  static constexpr int kEdge = kTileSamples + 1;
+  std::uint64_t rows[kEdge * kEdge];
+  std::uint64_t at(int y, int z) const { return rows[(z + 1) * kEdge + y + 1]; }
+};
+
+/// A border face with a part inside: x | y << 5 | z << 10 | face << 15 | polygon << 18.
+using CapFace = std::uint32_t;
+
+/// What closes the surface of a tile at the border (see cap.h).
+struct TileCap {
+  ExistingCells cells;
+  std::uint64_t used[kTileRows];     ///< bit x: a face of this tile has a corner on sample x
+  std::uint32_t first[kTileRows];    ///< which of `vertices` is the row's first
+  PodBuffer<SampleVertex> vertices;  ///< the used ones, by place
+  PodBuffer<CapFace> faces;
+  std::uint32_t own = 0;  ///< of the vertices made by this tile
+  std::uint32_t triangles = 0;
+
+  void clear() {
+    vertices.clear();
+    faces.clear();
+    own = triangles = 0;
+  }
 };
 
 /// Work space for one tile between counting and writing.
@@ -128,15 +157,18 @@ struct TileState {
   PodBuffer<std::uint32_t>
       edges;  ///< own edges in the order of their vertices: x | y << 6 | z << 12 | axis << 18
   std::uint32_t vertices = 0, triangles = 0;
-  std::uint32_t edge_vertices = 0;   ///< vertices on edges; inner ones follow, then coincident ones
-  std::uint32_t inner_vertices = 0;  ///< of patched cells
-  PodBuffer<PatchedCell> patched;    ///< cells that are not in `cells`; of Topology::trilinear
-  std::uint32_t patched_triangles = 0;               ///< of `triangles`, the last ones
+  /// Vertices on edges. Inner ones follow, then coincident ones, then those of the cap.
+  std::uint32_t edge_vertices = 0;
+  std::uint32_t inner_vertices = 0;     ///< of patched cells
+  PodBuffer<PatchedCell> patched;       ///< cells that are not in `cells`; of Topology::trilinear
+  std::uint32_t patched_triangles = 0;  ///< of `triangles`, the last before the cap's
   std::unique_ptr<CoincidentVertices> coincident;    ///< where degenerate triangles are left out
+  std::unique_ptr<TileCap> cap;                      ///< of a capped surface
   std::uint64_t vertex_base = 0, triangle_base = 0;  ///< where this tile's output goes
   std::uint32_t number_base = 0;                     ///< what its vertices are numbered from
   TileBoundary* boundary = nullptr;                  ///< of this tile, when later tiles need it
 
+  std::uint32_t cap_triangles() const { return cap ? cap->triangles : 0; }
   void clear_patched() {
     patched.clear();
     inner_vertices = patched_triangles = 0;

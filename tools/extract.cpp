@@ -295,6 +295,9 @@ void add_extract(Program& program) {
               "How the surface passes where corners allow several ways: by a rule for faces, or as "
               "the trilinear interpolant does, tunnels included (on the CPU)",
               "consistent"});
+  add_flag(app, "--cap", arguments->cap,
+           "Close the surface at the border of the volume or region and around missing samples (on "
+           "the CPU)");
   add_filters(app, arguments->filters);
   add_search(app, arguments->search);
   add_memory(app, arguments->memory);

@@ -92,6 +92,7 @@ ExtractOptions common_options(const ExtractArguments& arguments) {
   options.inside = arguments.inside;
   options.drop_degenerate = arguments.drop_degenerate;
   options.topology = arguments.topology;
+  options.cap = arguments.cap;
   // The driver is there from when a picture is opened, before anything is extracted.
   if (!arguments.preview.path.empty() && !arguments.estimate)
     options.memory_of_others = preview_driver_memory();
@@ -297,7 +298,8 @@ void check_space(const std::vector<ExtractedSurface>& surfaces, const StoreReade
   for (const ExtractedSurface& surface : surfaces) isovalues.push_back(surface.options.isovalue);
   const std::vector<ActiveParts> active = count_active(store, surfaces.front().options, isovalues);
   const auto largest = planned_meshes(surfaces, [&](std::size_t i) {
-    return PlannedMesh{.size = largest_mesh(active[i], surfaces[i].options.topology)};
+    return PlannedMesh{
+        .size = largest_mesh(active[i], surfaces[i].options.topology, surfaces[i].options.cap)};
   });
   if (!find_shortage(largest, free_space)) return;
   const auto likely = planned_meshes(surfaces, [&](std::size_t i) {

@@ -31,6 +31,7 @@ struct ExtractArguments {
   FilterArguments filters;
   bool drop_degenerate = false;
   Topology topology = Topology::consistent;
+  bool cap = false;
   std::uint64_t memory = std::uint64_t{1} << 30;
   int threads = 0;
   IndexChoice search;

@@ -14,6 +14,7 @@ inline std::optional<std::string> why_unsupported(const SurfaceOptions& options)
     return "degenerate triangles cannot be left out on a GPU; use --backend cpu";
   if (options.topology == Topology::trilinear)
     return "the topology of the trilinear interpolant has no kernels; use --backend cpu";
+  if (options.cap) return "capped surfaces have no kernels; use --backend cpu";
   return std::nullopt;
 }
 

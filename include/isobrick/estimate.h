@@ -9,7 +9,8 @@
 
 namespace isobrick::inline v0 {
 
-/// What of a level the isovalue touches, from the ranges alone.
+/// What of a level the isovalue touches, from the ranges alone. Of a capped surface also what lies
+/// at the border with a sample inside.
 struct ActiveParts {
   std::uint64_t bricks = 0;         ///< all of the level
   std::uint64_t active_bricks = 0;  ///< with a block that is stabbed
@@ -27,7 +28,7 @@ ISOBRICK_API std::vector<ActiveParts> count_active(const StoreReader& store,
 
 /// What no mesh in these parts exceeds; real ones are mostly some ten times smaller.
 ISOBRICK_API MeshSize largest_mesh(const ActiveParts& active,
-                                   Topology topology = Topology::consistent);
+                                   Topology topology = Topology::consistent, bool cap = false);
 
 /// What an extraction will need.
 struct ExtractEstimate {

@@ -36,6 +36,7 @@ struct ExtractOptions {
   bool normals = false;               ///< gradient normals
   bool drop_degenerate = false;       ///< see SurfaceOptions
   Topology topology = Topology::consistent;       ///< how ambiguous cells are resolved
+  bool cap = false;                               ///< see SurfaceOptions; on the CPU
   std::uint64_t memory = std::uint64_t{1} << 30;  ///< hard budget, bytes
   /// Of the budget of the whole command what others take; messages name both together.
   std::uint64_t memory_of_others = 0;
@@ -67,11 +68,12 @@ struct ExtractReport : SurfaceReport {
   double seconds = 0;             ///< wall time of all
   /// Wall time of counting active blocks, planning and opening the device.
   double plan_seconds = 0;
-  double decode_seconds = 0;       ///< wall time of waiting for decoded bricks
-  double surface_seconds = 0;      ///< wall time in which the surface was made
-  std::optional<IndexKind> index;  ///< that found the active blocks; none: ranges alone did
-  std::string backend = "cpu";     ///< or "cuda"
-  std::string device;              ///< its name, of the latter
+  double decode_seconds = 0;   ///< wall time of waiting for decoded bricks
+  double surface_seconds = 0;  ///< wall time in which the surface was made
+  /// That found the active blocks; none: ranges alone did, as for capped surfaces.
+  std::optional<IndexKind> index;
+  std::string backend = "cpu";  ///< or "cuda"
+  std::string device;           ///< its name, of the latter
   /// The surface was made from samples that stayed on the device, beside its mesh.
   bool resident = false;
   /// Why the GPU, which Backend::automatic chose, left the surface to the CPU; or empty.

@@ -83,7 +83,7 @@ std::vector<ActiveParts> visit_active(const StoreReader& store, const ExtractReq
                                       int level, std::span<const double> isovalues, F&& visit) {
   ActiveCounts counts(request, isovalues.size());
   TileStream tiles(store, level, {isovalues.begin(), isovalues.end()}, request.surface.roi,
-                   request.search);
+                   request.search, cap_search(request.surface));
   Workers workers(request.threads);  // an index is searched in parallel
   while (const auto work = workers.execute([&] { return tiles.next(); })) {
     visit(*work);
@@ -116,7 +116,8 @@ std::vector<ChunkCount> count_in_chunk(const StoreReader& store, const ExtractRe
                                        int level, std::span<const double> isovalues,
                                        const Box3& chunk) {
   std::vector<ChunkCount> counts(isovalues.size());
-  TileStream tiles(store, level, {isovalues.begin(), isovalues.end()}, chunk);
+  TileStream tiles(store, level, {isovalues.begin(), isovalues.end()}, chunk, {},
+                   cap_search(request.surface));
   while (const auto work = tiles.next())
     for (std::size_t i = 0; i < counts.size(); ++i) {
       std::vector<std::size_t>& bricks = counts[i].bricks;
@@ -199,7 +200,7 @@ Sampled look_at(const TileWork& work, const ExtractRequest& request, const Brick
   surface.roi.lo = max(min(samples.lo, corner - Int3{1, 1, 1}), request.surface.roi.lo);
   surface.roi.hi = samples.hi;
   const CpuExtractor extractor(lattice, surface, {.tiles = 1});
-  const MeshSize size = extractor.count(work, SomeBricks(bricks, own));
+  const MeshSize size = extractor.count(work, SomeBricks(bricks, own), request.surface.roi);
   return {static_cast<double>(cells), static_cast<double>(size.triangles),
           static_cast<double>(size.vertices)};
 }
@@ -273,12 +274,14 @@ std::vector<ActiveParts> count_active(const StoreReader& store, const ExtractOpt
   return visit_active(store, request, options.level, isovalues, [](const TileWork&) {});
 }
 
-MeshSize largest_mesh(const ActiveParts& active, Topology topology) {
-  constexpr Index closed = kBlockEdge + 1;
+MeshSize largest_mesh(const ActiveParts& active, Topology topology, bool cap) {
+  constexpr std::uint64_t closed = kBlockEdge + 1;
+  constexpr std::uint64_t samples = closed * closed * closed;
+  constexpr std::uint64_t faces = 3 * closed * kBlockEdge * kBlockEdge;
   const MeshSize of_cell = CpuExtractor::max_in_cell(topology);
-  return {
-      3 * closed * closed * closed * active.active_blocks + of_cell.vertices * active.active_cells,
-      of_cell.triangles * active.active_cells};
+  return {(cap ? 4 : 3) * samples * active.active_blocks + of_cell.vertices * active.active_cells,
+          of_cell.triangles * active.active_cells +
+              (cap ? kMaxFaceTriangles * faces * active.active_blocks : 0)};
 }
 
 ExtractEstimate estimate(const StoreReader& store, const ExtractOptions& options,

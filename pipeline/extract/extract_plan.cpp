@@ -38,19 +38,21 @@ bool any_drops(PassRequests requests) {
 std::uint64_t tile_output(PassRequests requests) {
   const bool normals = std::any_of(requests.begin(), requests.end(),
                                    [](const ExtractRequest& r) { return r.surface.normals; });
-  return CpuExtractor::max_tile_output(normals, topology_of(requests));
+  return CpuExtractor::max_tile_output(normals, topology_of(requests),
+                                       cap_bounds(common(requests).surface));
 }
 
 /// The work space for one tile.
 std::uint64_t workspace_bytes(PassRequests requests) {
   return CpuExtractor::workspace_bytes(common(requests).level->lattice.type, any_drops(requests),
-                                       topology_of(requests));
+                                       topology_of(requests), cap_bounds(common(requests).surface));
 }
 
 /// The boundaries that wait between finished and unfinished tiles.
 std::uint64_t boundary_bytes(PassRequests requests) {
-  return requests.size() *
-         CpuExtractor::boundary_bytes(common(requests).level->lattice.tiles(), any_drops(requests));
+  return requests.size() * CpuExtractor::boundary_bytes(common(requests).level->lattice.tiles(),
+                                                        any_drops(requests),
+                                                        cap_bounds(common(requests).surface));
 }
 
 /// What the CUDA driver and its context take of the host's memory.
@@ -128,15 +130,23 @@ ExtractRequest check_request(const StoreReader& store, const ExtractOptions& opt
                      .indexing = indexing,
                      .drop_degenerate = options.drop_degenerate,
                      .topology = options.topology,
+                     .cap = options.cap,
                      .roi = roi,
                      .transform = request.level->transform,
                      .fill_value = info.fill_value,
                      .may_have_nan = info.may_have_nan && is_floating(info.type)};
   request.threads = options.threads > 0 ? options.threads : tbb::info::default_concurrency();
+  check_cap(request.surface);
   request.search = resolve_index(store, options.level, options.index);
+  if (options.cap) request.search = {};  // an index finds only what the isovalue touches
   request.search_memory = block_search_bytes(store, options.level, request.search, request.threads);
   request.memory_of_others = options.memory_of_others;
   return request;
+}
+
+std::optional<CapSearch> cap_search(const SurfaceOptions& surface) {
+  if (!surface.cap) return std::nullopt;
+  return CapSearch{surface.inside, surface.roi, surface.may_have_nan};
 }
 
 std::vector<double> isovalues_of(PassRequests requests) {

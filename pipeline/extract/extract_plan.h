@@ -43,6 +43,9 @@ ExtractRequest check_request(const StoreReader& store, const ExtractOptions& opt
 /// and not in the region.
 using PassRequests = std::span<const ExtractRequest>;
 
+/// The search for the blocks of capped surfaces; nothing for others.
+std::optional<CapSearch> cap_search(const SurfaceOptions& surface);
+
 /// The isovalues of a pass, each once.
 std::vector<double> isovalues_of(PassRequests requests);
 /// Layers of samples around a tile that any of the surfaces needs.

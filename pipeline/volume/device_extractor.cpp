@@ -39,6 +39,7 @@ SurfaceOptions surface_of(const ExtractOptions& options, const Lattice& lattice)
           .normals = options.normals,
           .drop_degenerate = options.drop_degenerate,
           .topology = options.topology,
+          .cap = options.cap,
           .roi = roi};
 }
 

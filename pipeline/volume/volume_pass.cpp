@@ -16,6 +16,7 @@
 #include "core/length_unit.h"
 #include "core/machine_memory.h"
 #include "core/morton.h"
+#include "pipeline/extract/extract_plan.h"
 #include "pipeline/extract/mesh_header.h"
 #include "pipeline/program_memory.h"
 
@@ -139,9 +140,23 @@ VolumePass::VolumePass(VolumeSamples& samples, const ExtractOptions& options, In
               .indexing = indexing,
               .drop_degenerate = options.drop_degenerate,
               .topology = options.topology,
+              .cap = options.cap,
               .roi = options.roi.value_or(lattice.box()),
               .transform = samples.transform};
   check_roi(surface_.roi, lattice.extent);
+  check_cap(surface_);
+}
+
+/// As if samples were NaN, which is not known before they are scanned.
+CapBounds VolumePass::bounds_of_cap() const {
+  SurfaceOptions surface = surface_;
+  surface.may_have_nan = is_floating(samples_.lattice.type);
+  return cap_bounds(surface);
+}
+
+/// Appends the tiles of a box in which the surface may lie.
+void VolumePass::append_tiles(Box3 tiles, std::vector<TileWork>& out) const {
+  samples_.ranges->append_tiles(tiles, surface_.isovalue, cap_search(surface_), out);
 }
 
 /// What every extraction takes besides its surface and its regions.
@@ -153,16 +168,16 @@ std::uint64_t VolumePass::fixed_bytes() const {
   const std::uint64_t scans =
       in_place ? 0 : static_cast<std::uint64_t>(workers_.threads()) * range_scan_bytes(lattice);
   return samples_.source_bytes + samples_.range_bytes() + tiles * kListedTile + scans +
-         CpuExtractor::boundary_bytes(lattice.tiles(), surface_.drop_degenerate);
+         CpuExtractor::boundary_bytes(lattice.tiles(), surface_.drop_degenerate, bounds_of_cap());
 }
 
 /// Divides the budget among the ranges, what waits between tiles, work spaces, output and regions.
 void VolumePass::plan(bool has_sink, std::uint64_t sink_bytes) {
   const Lattice& lattice = samples_.lattice;
-  const std::uint64_t workspace =
-      CpuExtractor::workspace_bytes(lattice.type, surface_.drop_degenerate, surface_.topology);
+  const std::uint64_t workspace = CpuExtractor::workspace_bytes(
+      lattice.type, surface_.drop_degenerate, surface_.topology, bounds_of_cap());
   const std::uint64_t tile_output =
-      CpuExtractor::max_tile_output(surface_.normals, surface_.topology);
+      CpuExtractor::max_tile_output(surface_.normals, surface_.topology, bounds_of_cap());
   const auto region_bytes = [&](Index edge) -> std::uint64_t {
     if (samples_.array) return 0;
     const Int3 n = min(kOne * (edge * kTileEdge + 3), lattice.extent);
@@ -232,7 +247,7 @@ void VolumePass::find_ranges(Progress& progress) {
 std::vector<TileWork> VolumePass::active_tiles() const {
   std::vector<TileWork> tiles;
   tiles.reserve(static_cast<std::size_t>(volume(samples_.lattice.tiles())));
-  samples_.ranges->append_tiles(samples_.all_tiles(), surface_.isovalue, tiles);
+  append_tiles(samples_.all_tiles(), tiles);
   const Box3 roi = tiles_of_roi();
   std::erase_if(tiles, [&](const TileWork& work) { return !roi.contains(work.tile); });
   return tiles;
@@ -269,7 +284,7 @@ void VolumePass::for_each_region(F&& f) const {
     if (tiles.empty()) return;
     active.clear();
     const bool is_known = samples_.is_known(tiles);
-    if (is_known) samples_.ranges->append_tiles(region, surface_.isovalue, active);
+    if (is_known) append_tiles(region, active);
     if (!is_known || !active.empty()) f(tiles);
   });
 }
@@ -309,7 +324,7 @@ void VolumePass::extract_region(CpuExtractor& extractor, const SampleArray& read
   }
   std::vector<TileWork> active;
   const Int3 corner = floor_div(tiles.lo, kOne * region_tiles_) * region_tiles_;
-  samples_.ranges->append_tiles({corner, corner + kOne * region_tiles_}, surface_.isovalue, active);
+  append_tiles({corner, corner + kOne * region_tiles_}, active);
   std::erase_if(active, [&](const TileWork& work) { return !tiles.contains(work.tile); });
   if (!active.empty()) workers_.execute([&] { extractor.extract(active, samples); });
 }
@@ -318,10 +333,10 @@ void VolumePass::extract_region(CpuExtractor& extractor, const SampleArray& read
 void VolumePass::prepare(Progress& progress) {
   if (samples_.array) find_ranges(progress);
   const bool known = samples_.is_known(tiles_of_roi());
-  if (known) tiles_ = active_tiles();
   // Samples that are not known yet may be NaN.
   surface_.may_have_nan =
       is_floating(samples_.lattice.type) && (samples_.ranges->has_nan() || !known);
+  if (known) tiles_ = active_tiles();
 }
 
 void VolumePass::extract(CpuExtractor& extractor, Progress& progress) {

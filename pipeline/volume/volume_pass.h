@@ -24,9 +24,11 @@ class VolumePass {
  private:
   void plan(bool has_sink, std::uint64_t sink_bytes);
   std::uint64_t fixed_bytes() const;
+  CapBounds bounds_of_cap() const;
   Box3 tiles_of_roi() const;
   std::uint64_t sample_bytes(Box3 tiles) const;
   void find_ranges(Progress& progress);
+  void append_tiles(Box3 tiles, std::vector<TileWork>& out) const;
   std::vector<TileWork> active_tiles() const;
   Box3 active_cells(const std::vector<TileWork>& tiles) const;
   void prepare(Progress& progress);

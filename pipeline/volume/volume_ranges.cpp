@@ -59,14 +59,20 @@ class TypedVolumeRanges final : public VolumeRanges {
     });
   }
 
-  void append_tiles(Box3 tiles, double isovalue, std::vector<TileWork>& out) const override {
+  void append_tiles(Box3 tiles, double isovalue, const std::optional<CapSearch>& cap,
+                    std::vector<TileWork>& out) const override {
+    const auto append = [&](Box3 blocks, std::span<const ValueRange<T>> ranges) {
+      if (cap)
+        append_capped_tiles<T>(blocks, ranges, isovalue, *cap, out);
+      else
+        append_active_tiles<T>(blocks, ranges, isovalue, out);
+    };
     const Box3 blocks =
         intersect({tiles.lo * kBlocksOfTile, tiles.hi * kBlocksOfTile}, {{0, 0, 0}, blocks_});
-    if (blocks == Box3{{0, 0, 0}, blocks_})
-      return append_active_tiles<T>(blocks, ranges_.span(), isovalue, out);
+    if (blocks == Box3{{0, 0, 0}, blocks_}) return append(blocks, ranges_.span());
     std::vector<ValueRange<T>> part;
     for_each_point(blocks, [&](Int3 b) { part.push_back(at(b)); });
-    append_active_tiles<T>(blocks, part, isovalue, out);
+    append(blocks, part);
   }
 
   bool has_nan() const override { return has_nan_; }

@@ -1,11 +1,13 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include <isobrick/lattice.h>
 #include <isobrick/range.h>
 #include "core/tile.h"
+#include "index/active_tiles.h"
 #include "pipeline/volume/array_samples.h"
 
 namespace isobrick::inline v0 {
@@ -19,8 +21,9 @@ class VolumeRanges {
   /// for boxes that do not overlap.
   virtual void scan(const ArraySamples& samples, Box3 blocks) = 0;
   /// Appends the tiles of a box with an active block, in Morton order within the box: a cube of
-  /// tiles of a power of two, or the whole volume.
-  virtual void append_tiles(Box3 tiles, double isovalue, std::vector<TileWork>& out) const = 0;
+  /// tiles of a power of two, or the whole volume. With `cap` also those of capped surfaces.
+  virtual void append_tiles(Box3 tiles, double isovalue, const std::optional<CapSearch>& cap,
+                            std::vector<TileWork>& out) const = 0;
   /// Whether any sample was NaN so far.
   virtual bool has_nan() const = 0;
   /// Of all blocks that were scanned.

@@ -197,7 +197,8 @@ def box_of(roi, shape):
 
 def extract_options(
     isovalue, *, box=None, level=0, normals=False, inside=None, drop_degenerate=False,
-    topology="consistent", memory=2**30, threads=0, backend="auto", gpu_memory=0, device=0,
+    topology="consistent", cap=False, memory=2**30, threads=0, backend="auto", gpu_memory=0,
+    device=0,
 ):
     options = _isobrick.ExtractOptions()
     options.isovalue = number(isovalue, "isovalue")
@@ -211,6 +212,7 @@ def extract_options(
     if topology not in ("consistent", "trilinear"):
         raise UsageError(f"topology must be 'consistent' or 'trilinear', not {topology!r}")
     options.topology = getattr(_isobrick.Topology, topology)
+    options.cap = bool(cap)
     options.memory = byte_count(memory)
     options.threads = thread_count(threads)
     if backend not in ("auto", "cpu", "cuda"):

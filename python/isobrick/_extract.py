@@ -125,7 +125,7 @@ class Extractor:
 
     def extract(
         self, isovalue, *, roi=None, normals=False, inside="above", drop_degenerate=False,
-        topology="consistent", min_component=0, largest=0, smooth=0, pass_band=0.1,
+        topology="consistent", cap=False, min_component=0, largest=0, smooth=0, pass_band=0.1,
         simplify=None, max_error=None, memory=2**30,
         threads=0, progress=None,
     ):
@@ -147,6 +147,9 @@ class Extractor:
         topology : "consistent" or "trilinear"
             How the surface passes where the corners of a cell allow several ways: by a rule for
             faces, or as the trilinear interpolant does; not on a device.
+        cap : bool
+            Closes the surface at the border and around missing samples; neither on a device nor
+            with `drop_degenerate`.
         min_component, largest, smooth, pass_band, simplify, max_error
             Filters of the mesh, as of `Volume.extract`; not on a device.
         memory : int or str
@@ -168,7 +171,7 @@ class Extractor:
         requests = [
             self._surface(
                 one, roi=roi, normals=normals, inside=inside, drop_degenerate=drop_degenerate,
-                topology=topology, memory=memory, threads=threads, progress=progress,
+                topology=topology, cap=cap, memory=memory, threads=threads, progress=progress,
             )
             for one in (isovalue if several else [isovalue])
         ]
@@ -178,7 +181,7 @@ class Extractor:
 
     def save(
         self, path, isovalue, *, roi=None, normals=False, inside="above", drop_degenerate=False,
-        topology="consistent", min_component=0, largest=0, smooth=0, pass_band=0.1,
+        topology="consistent", cap=False, min_component=0, largest=0, smooth=0, pass_band=0.1,
         simplify=None, max_error=None, measure=False,
         memory=2**30, threads=0, progress=None, force=False, quantize=False,
     ):
@@ -194,7 +197,7 @@ class Extractor:
         )
         options = self._surface(
             isovalue, roi=roi, normals=normals, inside=inside, drop_degenerate=drop_degenerate,
-            topology=topology, memory=memory, threads=threads, progress=progress,
+            topology=topology, cap=cap, memory=memory, threads=threads, progress=progress,
         )
         file = mesh_file_options(force=force, quantize=quantize, threads=threads, memory=memory)
         if self._on_device:
@@ -235,7 +238,7 @@ class Extractor:
 def extract(
     array, isovalue, *, spacing=None, origin=None, direction=None, unit=None, mask=None,
     nodata=None, stream=None, roi=None, normals=False, inside="above", drop_degenerate=False,
-    topology="consistent", min_component=0, largest=0, smooth=0, pass_band=0.1,
+    topology="consistent", cap=False, min_component=0, largest=0, smooth=0, pass_band=0.1,
     simplify=None, max_error=None, memory=2**30,
     threads=0, progress=None,
 ):
@@ -247,7 +250,7 @@ def extract(
     ----------
     array, spacing, origin, direction, unit, mask, nodata, stream
         As of `Extractor`: arrays are indexed [z, y, x]; world space is x, y, z.
-    isovalue, roi, normals, inside, drop_degenerate, topology, memory, threads, progress
+    isovalue, roi, normals, inside, drop_degenerate, topology, cap, memory, threads, progress
         As of `Extractor.extract`.
     min_component, largest, smooth, pass_band, simplify, max_error
         As of `Volume.extract`.
@@ -266,7 +269,7 @@ def extract(
     )
     return extractor.extract(
         isovalue, roi=roi, normals=normals, inside=inside, drop_degenerate=drop_degenerate,
-        topology=topology, min_component=min_component, largest=largest, smooth=smooth,
+        topology=topology, cap=cap, min_component=min_component, largest=largest, smooth=smooth,
         pass_band=pass_band, simplify=simplify, max_error=max_error, memory=memory,
         threads=threads, progress=progress,
     )

@@ -38,6 +38,7 @@ class ExtractOptions:
     normals: bool
     drop_degenerate: bool
     topology: Topology
+    cap: bool
     memory: int
     memory_of_others: int
     threads: int

@@ -169,7 +169,7 @@ class Volume:
 
     def extract(
         self, isovalue, *, level=0, roi=None, normals=False, inside=None, drop_degenerate=False,
-        topology="consistent", min_component=0, largest=0, smooth=0, pass_band=0.1,
+        topology="consistent", cap=False, min_component=0, largest=0, smooth=0, pass_band=0.1,
         simplify=None, max_error=None, backend="auto",
         memory=2**30, threads=0, gpu_memory=0, device=0, progress=None,
     ):
@@ -193,6 +193,9 @@ class Volume:
         topology : "consistent" or "trilinear"
             How the surface passes where the corners of a cell allow several ways: by a rule for
             faces, or as the trilinear interpolant does; on the CPU.
+        cap : bool
+            Closes the surface at the border and around missing samples; on the CPU, and not with
+            `drop_degenerate`.
         min_component : int
             Drops components with fewer triangles.
         largest : int
@@ -217,8 +220,9 @@ class Volume:
         """
         request = dict(
             level=level, roi=roi, normals=normals, inside=inside,
-            drop_degenerate=drop_degenerate, topology=topology, backend=backend, memory=memory,
-            threads=threads, gpu_memory=gpu_memory, device=device, progress=progress,
+            drop_degenerate=drop_degenerate, topology=topology, cap=cap, backend=backend,
+            memory=memory, threads=threads, gpu_memory=gpu_memory, device=device,
+            progress=progress,
         )
         filters = filter_options(
             min_component=min_component, largest=largest, smooth=smooth, pass_band=pass_band,
@@ -241,7 +245,8 @@ class Volume:
 
     def save_mesh(
         self, path, isovalue, *, level=0, roi=None, normals=False, inside=None,
-        drop_degenerate=False, topology="consistent", min_component=0, largest=0, smooth=0,
+        drop_degenerate=False, topology="consistent", cap=False, min_component=0, largest=0,
+        smooth=0,
         pass_band=0.1, simplify=None, max_error=None, measure=False, backend="auto",
         memory=2**30, threads=0, gpu_memory=0, device=0,
         progress=None, force=False, quantize=False,
@@ -259,8 +264,8 @@ class Volume:
         )
         options = self._surface(
             isovalue, progress=progress, level=level, roi=roi, normals=normals, inside=inside,
-            drop_degenerate=drop_degenerate, topology=topology, backend=backend, memory=memory,
-            threads=threads, gpu_memory=gpu_memory, device=device,
+            drop_degenerate=drop_degenerate, topology=topology, cap=cap, backend=backend,
+            memory=memory, threads=threads, gpu_memory=gpu_memory, device=device,
         )
         file = mesh_file_options(force=force, quantize=quantize, threads=threads, memory=memory)
         with reporting(progress) as report:

@@ -48,6 +48,7 @@ void bind_extract_options(py::module_& module) {
       .def_readwrite("normals", &ExtractOptions::normals)
       .def_readwrite("drop_degenerate", &ExtractOptions::drop_degenerate)
       .def_readwrite("topology", &ExtractOptions::topology)
+      .def_readwrite("cap", &ExtractOptions::cap)
       .def_readwrite("memory", &ExtractOptions::memory)
       .def_readwrite("memory_of_others", &ExtractOptions::memory_of_others)
       .def_readwrite("threads", &ExtractOptions::threads)

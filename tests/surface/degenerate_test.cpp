@@ -85,15 +85,15 @@ TEST(DropDegenerateAt, BoundariesAreNoLargerThanTheirBound) {
   TileState tile;
   tile.boundary = &boundary;
   tile.coincident = std::make_unique<CoincidentVertices>();
-  PodBuffer<CoincidentVertex>& vertices = tile.coincident->vertices;
+  PodBuffer<SampleVertex>& vertices = tile.coincident->vertices;
   for_each_point({{0, 0, 0}, {kTileSamples, kTileSamples, kTileSamples}}, [&](Int3 p) {
     vertices.resize(vertices.size() + 1);
     vertices[vertices.size() - 1] = {static_cast<std::uint32_t>(p.x | p.y << 6 | p.z << 12), 0,
-                                     CoincidentVertex::kOwn};
+                                     SampleVertex::kOwn};
   });
   publish_coincident(tile);
   EXPECT_EQ(boundary.coincident.size(), 33u * 33 * 33 - 31 * 31 * 31);
-  EXPECT_LE(boundary.coincident.capacity() * sizeof(CoincidentFace),
+  EXPECT_LE(boundary.coincident.capacity() * sizeof(SharedSample),
             CpuExtractor::boundary_bytes({1, 1, 1}, true) -
                 CpuExtractor::boundary_bytes({1, 1, 1}, false));
 }

@@ -78,6 +78,7 @@ struct Request {
   std::size_t workspaces = 64;
   bool drop_degenerate = false;
   Topology topology = Topology::consistent;
+  bool cap = false;
 };
 
 /// Our mesh of a field, through bricks, ranges and the CPU extractor.
@@ -94,11 +95,17 @@ Mesh extract(const Field<T>& field, const Request& request) {
   options.inside = request.inside;
   options.drop_degenerate = request.drop_degenerate;
   options.topology = request.topology;
+  options.cap = request.cap;
   if constexpr (std::is_floating_point_v<T>)
     for (const T v : field.samples) options.may_have_nan |= std::isnan(v);
   std::vector<TileWork> tiles;
   const auto ranges = block_ranges(field);
-  append_active_tiles<T>({{0, 0, 0}, lattice.blocks()}, ranges, request.isovalue, tiles);
+  const Box3 blocks{{0, 0, 0}, lattice.blocks()};
+  if (request.cap)
+    append_capped_tiles<T>(blocks, ranges, request.isovalue,
+                           {request.inside, options.roi, options.may_have_nan}, tiles);
+  else
+    append_active_tiles<T>(blocks, ranges, request.isovalue, tiles);
   CpuExtractor extractor(lattice, options, {.tiles = request.workspaces});
   for (std::size_t i = 0; i < tiles.size(); i += std::min(request.batch, tiles.size()))
     extractor.extract(std::span(tiles).subspan(i, std::min(request.batch, tiles.size() - i)),
