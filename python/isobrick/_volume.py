@@ -246,10 +246,9 @@ class Volume:
     def save_mesh(
         self, path, isovalue, *, level=0, roi=None, normals=False, inside=None,
         drop_degenerate=False, topology="consistent", cap=False, min_component=0, largest=0,
-        smooth=0,
-        pass_band=0.1, simplify=None, max_error=None, measure=False, backend="auto",
-        memory=2**30, threads=0, gpu_memory=0, device=0,
-        progress=None, force=False, quantize=False,
+        smooth=0, pass_band=0.1, simplify=None, max_error=None, measure=False, backend="auto",
+        memory=2**30, threads=0, gpu_memory=0, device=0, progress=None, force=False,
+        quantize=False,
     ):
         """Streams a surface to a mesh file, so that volume and mesh may be larger than memory.
 

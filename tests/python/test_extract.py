@@ -228,3 +228,17 @@ def test_edge_cases():
     assert len(isobrick.extract(np.zeros((1, 1, 1), np.float32), 0.5)) == 0
     assert len(isobrick.extract(np.zeros((1, 5, 7), np.uint8), 0.5, normals=True)) == 0
     assert len(isobrick.extract(ball(), np.inf)) == 0
+
+
+def test_caps_close_what_the_border_cuts():
+    field = np.zeros((20, 24, 28), np.float32)
+    field[:, :, 10:] = 1
+    mesh = isobrick.extract(field, 0.5, cap=True)
+    assert mesh.measure().volume == pytest.approx(17.5 * 23 * 19)
+    assert isobrick.extract(field, 0.5).measure().volume is None
+    field[8:10, 9:11, 18:20] = np.nan
+    holed = isobrick.extract(field, 0.5, cap=True).measure()
+    assert holed.components == 2 and holed.volume == pytest.approx(17.5 * 23 * 19 - 27)
+    assert isobrick.extract(np.ones((3, 4, 5), "u1"), 1, cap=True).measure().volume == 2 * 3 * 4
+    with pytest.raises(isobrick.UsageError, match="cap"):
+        isobrick.extract(field, 0.5, cap=True, drop_degenerate=True)
