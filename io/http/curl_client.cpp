@@ -4,8 +4,8 @@
 
 #include <algorithm>
 #include <cctype>
+#include <charconv>
 #include <cmath>
-#include <cstdlib>
 #include <random>
 #include <string_view>
 #include <utility>
@@ -19,6 +19,8 @@ using namespace std::chrono_literals;
 
 constexpr auto kFirstPause = 250ms;
 constexpr auto kMaxPause = 10s;
+/// Seconds that a server may ask for.
+constexpr int kMaxRetryAfter = 60;
 /// Of each request, before any server has replied.
 constexpr int kFirstTries = 3;
 /// Bytes of the reply to a failed request that are kept, for the message.
@@ -56,6 +58,14 @@ std::string s3_problem(const std::vector<std::byte>& body) {
     problem += (problem.empty() ? "" : ": ") + std::string(text.substr(from, end - from));
   }
   return problem;
+}
+
+/// The number that a text is, or nullopt.
+std::optional<int> number_in(std::string_view text) {
+  int number = 0;
+  const auto [at, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  if (error != std::errc() || at != text.data() + text.size()) return std::nullopt;
+  return number;
 }
 
 std::chrono::milliseconds random_part(std::chrono::milliseconds pause) {
@@ -122,7 +132,7 @@ struct CurlLoop::Transfer {
     if (line.starts_with("HTTP/")) {  // also of each redirection
       t.reply = {};
       const std::size_t space = line.find(' ');
-      t.reply.status = space == line.npos ? 0 : std::atoi(line.substr(space + 1, 3).data());
+      if (space != line.npos) t.reply.status = number_in(line.substr(space + 1, 3)).value_or(0);
       if (t.request.range && t.reply.status < 300)
         t.reply.body.reserve(static_cast<std::size_t>(t.request.range->size));
       return line.size();
@@ -349,7 +359,7 @@ void CurlLoop::finish(CURL* easy, CURLcode code) {
   // A name that is wrong, and a machine without a network, are no failures for a while.
   const int tries = is_reachable_ ? options_.tries : std::min(options_.tries, kFirstTries);
   const bool can_help = code == CURLE_OK || is_temporary(code);
-  if (can_help && t.tries < tries) return try_again(std::move(transfer), why);
+  if (can_help && t.tries < tries) return try_again(std::move(transfer));
   const std::string count = t.tries > 1 ? fmt::format(" ({} tries)", t.tries) : "";
   const auto error = std::make_exception_ptr(
       Error(fmt::format("cannot read '{}': {}{}", t.request.url, why, count)));
@@ -357,15 +367,12 @@ void CurlLoop::finish(CURL* easy, CURLcode code) {
 }
 
 /// After a pause that doubles, or the one that the server asks for.
-void CurlLoop::try_again(Owned transfer, const std::string& /*why*/) {
+void CurlLoop::try_again(Owned transfer) {
   std::chrono::milliseconds pause = kFirstPause * (1 << std::min(transfer->tries - 1, 16));
   pause = random_part(std::min<std::chrono::milliseconds>(pause, kMaxPause));
-  const std::string& after = transfer->reply.header("retry-after");
-  if (!after.empty() && std::all_of(after.begin(), after.end(), [](char c) {
-        return std::isdigit(static_cast<unsigned char>(c)) != 0;
-      }))
+  if (const auto seconds = number_in(transfer->reply.header("retry-after")))
     pause = std::max<std::chrono::milliseconds>(
-        pause, std::chrono::seconds(std::min(60, std::atoi(after.c_str()))));
+        pause, std::chrono::seconds(std::clamp(*seconds, 0, kMaxRetryAfter)));
   transfer->clear();
   // A std::function must be copyable.
   const auto held = std::make_shared<Owned>(std::move(transfer));

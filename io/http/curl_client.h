@@ -41,7 +41,7 @@ class CurlLoop {
   void start(Owned transfer);
   void set_options(Transfer& transfer) const;
   void finish(CURL* easy, CURLcode code);
-  void try_again(Owned transfer, const std::string& why);
+  void try_again(Owned transfer);
   void run_timers();
   int poll_timeout() const;
   void fail_all();
