@@ -261,7 +261,7 @@ TYPED_TEST(CapAroundNanOf, BricksBatchesAndThreadsNeverShow) {
 
 // Where eight tiles meet, whichever of them has cells there.
 TEST(Cap, TheCornerOfEightTiles) {
-  for (unsigned seed = 0; seed < 200; ++seed) {
+  for (unsigned seed = 0; seed < 60; ++seed) {
     std::mt19937 random(seed);
     const unsigned rare = 2 + seed % 5;
     const Box3 core{{30, 30, 30}, {35, 35, 35}};
@@ -299,7 +299,7 @@ Field<float> sphere(Int3 extent, Vec3d centre, double radius) {
 TEST(Cap, OfASphereThatTheBorderCuts) {
   // The height of the part beyond x = 0. No sample of that plane lies on the sphere.
   const double radius = 20, height = 8.5;
-  const auto field = sphere({60, 60, 60}, {radius - height, 30, 30}, radius);
+  const auto field = sphere({60, 60, 60}, {radius - height, 30.1, 29.8}, radius);
   const Mesh mesh = extract(field, {.normals = true, .cap = true});
   EXPECT_TRUE(is_closed_manifold(mesh));
   const double expected = std::numbers::pi * (4.0 / 3 * radius * radius * radius -
