@@ -88,7 +88,7 @@ void extract_to(const OpenedVolume& volume, ExtractOptions options, MeshSink& si
   });
 }
 
-std::pair<Vec3d, Vec3d> bounds_of(const OpenedVolume& volume, ExtractOptions options) {
+std::pair<Vec3d, Vec3d> bounds_of_surface(const OpenedVolume& volume, ExtractOptions options) {
   return interruptible(py::none(), [&](Reporter reporter) {
     options.cancel = reporter.cancel;
     return surface_bounds([&](MeshSink& sink) { extract(volume.store(), options, sink); });
@@ -219,7 +219,7 @@ void bind_store(py::module_& module) {
       .def("extract", &extract_mesh)
       .def("extract_several", &extract_meshes)
       .def("extract_to", &extract_to)
-      .def("surface_bounds", &bounds_of)
+      .def("surface_bounds", &bounds_of_surface)
       .def("save_mesh", &save_mesh)
       .def("estimate", &estimate_mesh)
       .def("read", &read_samples)
