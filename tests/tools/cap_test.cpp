@@ -12,7 +12,7 @@ class Cap : public ProgramTest {
  protected:
   /// A store of samples f(x, y, z) of 40 x 36 x 33.
   template <class F>
-  std::string store_of(const std::string& name, F&& f, const Arguments& more = {}) {
+  std::string store_of(const std::string& name, F&& f, const std::string& brick = "16") {
     std::string bytes;
     for (int z = 0; z < 33; ++z)
       for (int y = 0; y < 36; ++y)
@@ -21,11 +21,9 @@ class Cap : public ProgramTest {
           bytes.append(reinterpret_cast<const char*>(&value), sizeof value);
         }
     write_file(path(name + ".raw"), bytes);
-    Arguments words{"convert", path(name + ".raw"), path(name + ".zarr"),
-                    "--dims",  "40,36,33",          "--type",
-                    "f32",     "--brick",           "16"};
-    words.insert(words.end(), more.begin(), more.end());
-    EXPECT_EQ(run(words).exit_code, 0);
+    const Outcome converted = run({"convert", path(name + ".raw"), path(name + ".zarr"), "--dims",
+                                   "40,36,33", "--type", "f32", "--brick", brick});
+    EXPECT_EQ(converted.exit_code, 0) << converted.err;
     return path(name + ".zarr");
   }
   nlohmann::json capped(const std::string& store, const std::string& isovalue,
@@ -69,7 +67,7 @@ TEST_F(Cap, NothingElseShows) {
   ASSERT_EQ(run({"index", store, "--kind", "octree"}).exit_code, 0);
   capped(store, "2.5", {"--search", "octree"});
   EXPECT_TRUE(read_file(path("capped.ply")) == expected);
-  capped(store_of("other", ball, {"--brick", "32"}), "2.5");
+  capped(store_of("other", ball, "32"), "2.5");
   EXPECT_TRUE(read_file(path("capped.ply")) == expected);
 }
 
