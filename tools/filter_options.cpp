@@ -11,10 +11,11 @@
 namespace isobrick::tools {
 namespace {
 
-/// "0.1" and "10%" are ratios, "1000", "500k" and "2M" are triangles.
+/// "0.1" and "10%" are ratios, "1000", "500k" and "1.5M" are triangles.
 void parse_simplify(const std::string& text, FilterArguments& filters) {
   const bool is_percent = text.ends_with('%');
-  if (!is_percent && text.find('.') == text.npos && text != "1" && text != "0") {
+  const bool has_unit = text.find_last_of("kKMG") != text.npos;
+  if (has_unit || (!is_percent && text.find('.') == text.npos && text != "1" && text != "0")) {
     filters.simplify_triangles = parse_count(text);
     return;
   }

@@ -158,6 +158,8 @@ TEST_F(Filter, Simplifies) {
   EXPECT_LE(count["triangles"].get<double>(), 3300);
   EXPECT_LT(extract(store_, "127.5", "near.stl", {"--max-error", "0.2"})["triangles"].get<double>(),
             all);
+  EXPECT_EQ(extract(store_, "127.5", "fraction.ply", {"--simplify", "2.5k"})["simplify_goal"],
+            2500);
   extract(store_, "127.5", "one.ply", {"--simplify", "1"});
   EXPECT_EQ(read_file(path("one.ply")), read_file(path("whole.ply")));
   for (const char* wrong : {"0", "1.5", "-0.1", "120%", "nan", "0.0"})
