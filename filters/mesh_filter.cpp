@@ -100,7 +100,7 @@ std::uint64_t filter_scratch_bytes(const MeshFilterOptions& options, MeshSize me
   // Two filters have the mesh at the same time while one passes it on.
   if (chooses_components(options)) bytes += v * (row + 16) + triangles;
   if (options.smooth > 0) bytes += v * (row + 20) + triangles;
-  if (options.simplifies()) bytes += v * (row + 4) + 2 * triangles;
+  if (options.simplifies()) bytes += v * (row + 4 + 12) + 2 * triangles;
   if (options.measure) bytes += v * (sizeof(Vec3f) + 4);
   return bytes;
 }
@@ -120,9 +120,10 @@ class MeshFilter::Stages {
     count_ = &add<CountStage>(first_->indexing());
     if (options.measure) measure_ = &add<MeasureStage>(place_, memory_);
     if (options.simplifies())
-      add<SimplifyStage>(place_, memory_,
-                         Simplification{options.simplify_ratio, options.simplify_triangles,
-                                        options.max_error, options.threads, options.progress});
+      simplify_ =
+          &add<SimplifyStage>(place_, memory_,
+                              Simplification{options.simplify_ratio, options.simplify_triangles,
+                                             options.max_error, options.threads, options.progress});
     if (options.smooth > 0)
       add<SmoothStage>(place_, memory_,
                        Smoothing{options.smooth, options.pass_band, options.progress});
@@ -134,6 +135,9 @@ class MeshFilter::Stages {
   MeshSize size() const { return count_->size(); }
   std::optional<MeshMeasure> measure() const {
     return measure_ ? std::optional(measure_->measure()) : std::nullopt;
+  }
+  std::optional<std::uint64_t> simplify_goal() const {
+    return simplify_ ? simplify_->goal() : std::nullopt;
   }
 
  private:
@@ -153,6 +157,7 @@ class MeshFilter::Stages {
   std::vector<std::unique_ptr<FilterStage>> stages_;
   const CountStage* count_ = nullptr;
   const MeasureStage* measure_ = nullptr;
+  const SimplifyStage* simplify_ = nullptr;
   MeshSink* first_;
 };
 
@@ -169,6 +174,7 @@ std::uint64_t MeshFilter::bytes() const { return stages_->first().bytes(); }
 std::uint64_t MeshFilter::memory() const { return stages_->first().memory(); }
 MeshSize MeshFilter::size() const { return stages_->size(); }
 std::optional<MeshMeasure> MeshFilter::measure() const { return stages_->measure(); }
+std::optional<std::uint64_t> MeshFilter::simplify_goal() const { return stages_->simplify_goal(); }
 
 MeshMeasure measure(const Mesh& mesh) {
   check_numbers(mesh);

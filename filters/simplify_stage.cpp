@@ -2,15 +2,12 @@
 
 #include <tbb/info.h>
 #include <tbb/parallel_for.h>
-#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
 #include <utility>
-
-#include "core/vectors.h"
 
 namespace isobrick::inline v0 {
 namespace {
@@ -19,7 +16,7 @@ namespace {
 constexpr std::uint64_t kGroupTriangles = 100000;
 /// Groups that are simplified at the same time, and what each takes.
 constexpr std::size_t kGroupsAtOnce = 4;
-constexpr std::uint64_t kGroupBytes = kGroupTriangles * 200;
+constexpr std::uint64_t kGroupBytes = kGroupTriangles * 300;
 /// Where boxes are divided in each pass: no border of a pass is one of another.
 constexpr std::array<double, 3> kSplits{0.5, 0.37, 0.63};
 /// Of the way to the goal, on a logarithmic scale, where each pass ends. Were the first to go all
@@ -27,47 +24,17 @@ constexpr std::array<double, 3> kSplits{0.5, 0.37, 0.63};
 constexpr std::array<double, 3> kGoals{0.4, 0.75, 1};
 /// Of the permitted error, the part of each pass: errors add up.
 constexpr std::array<double, 3> kErrorShares{0.5, 0.25, 0.25};
+/// A group is collapsed until it has so many times fewer triangles than its part of the goal: flat
+/// ones give more.
+constexpr double kReserve = 3;
 constexpr double kAnyDistance = std::numeric_limits<double>::infinity();
 
-/// How a group's error grows while its triangles become fewer.
-struct ErrorCurve {
-  struct Point {
-    double error, triangles;
-  };
-  std::vector<Point> points;  ///< errors ascend, triangles descend
-
-  /// Triangles that are left at an error.
-  double at(double error) const {
-    if (error >= points.back().error) return points.back().triangles;
-    std::size_t i = 1;
-    while (points[i].error <= error) ++i;
-    const Point a = points[i - 1], b = points[i];
-    return a.triangles + (b.triangles - a.triangles) * (error - a.error) / (b.error - a.error);
-  }
-};
-
-/// Halves a group until it has less than `least` triangles.
-ErrorCurve curve_of(TriangleGroup group, double least) {
-  ErrorCurve curve;
-  curve.points.push_back({0, static_cast<double>(group.triangles.size())});
-  double error = 0;
-  while (static_cast<double>(group.triangles.size()) > least) {
-    const std::uint64_t before = group.triangles.size();
-    SimplifiedGroup half = simplify(group, {before / 2, kAnyDistance, true});
-    if (half.triangles.size() >= before) break;
-    group.triangles = std::move(half.triangles);
-    error = std::max(error, half.quadric_error);
-    const auto left = static_cast<double>(group.triangles.size());
-    if (error > curve.points.back().error)
-      curve.points.push_back({error, left});
-    else
-      curve.points.back().triangles = left;
-    if (group.triangles.size() > before / 4 * 3) break;  // locked vertices are in the way
-  }
-  return curve;
-}
-
 std::uint64_t rounded(double count) { return static_cast<std::uint64_t>(std::llround(count)); }
+
+int threads_of(const Simplification& simplification) {
+  const int most = tbb::info::default_concurrency();
+  return simplification.threads > 0 ? std::min(simplification.threads, most) : most;
+}
 
 }  // namespace
 
@@ -75,16 +42,19 @@ SimplifyStage::SimplifyStage(MeshSink& next, std::stop_token cancel, const Scrat
                              std::uint64_t memory, const Simplification& simplification)
     : FilterStage(next, std::move(cancel)),
       simplification_(simplification),
+      arena_(threads_of(simplification)),
       place_(place),
       sorted_memory_(memory / 4),
       mesh_(place, memory / 2),
-      numbers_(place, memory / 8) {
+      collapses_(place, memory / 16),
+      numbers_(place, memory / 16) {
   constexpr double far = std::numeric_limits<double>::infinity();
   bounds_ = {{far, far, far}, {-far, -far, -far}};
 }
 
 std::uint64_t SimplifyStage::own_memory() const {
-  return mesh_.memory() + sorted_memory_ + numbers_.memory() + kGroupsAtOnce * kGroupBytes;
+  return mesh_.memory() + sorted_memory_ + collapses_.memory() + numbers_.memory() +
+         kGroupsAtOnce * kGroupBytes;
 }
 
 void SimplifyStage::begin(const MeshHeader& header) {
@@ -102,85 +72,68 @@ void SimplifyStage::write(const MeshChunk& chunk) {
     }
 }
 
-std::uint64_t SimplifyStage::target() const {
+std::optional<std::uint64_t> SimplifyStage::find_goal() const {
   if (simplification_.triangles > 0) return simplification_.triangles;
-  if (simplification_.ratio >= 1 && simplification_.max_error > 0) return 0;
+  if (simplification_.ratio >= 1 && simplification_.max_error > 0) return std::nullopt;
   return rounded(simplification_.ratio * static_cast<double>(mesh_.size().triangles));
 }
 
-/// Calls f(group, its number) for all groups, several at the same time, and then g(number) in
-/// order.
+/// Calls f(group) for each group.
 template <class F>
-void SimplifyStage::for_each_group(TriangleGroups& groups, F&& f) {
-  const int most = tbb::info::default_concurrency();
-  const int threads = simplification_.threads > 0 ? std::min(simplification_.threads, most) : most;
-  tbb::task_arena arena(threads);
+void SimplifyStage::in_parallel(std::vector<TriangleGroup>& groups, F&& f) {
+  arena_.execute([&] {
+    tbb::parallel_for(std::size_t{0}, groups.size(), [&](std::size_t i) { f(groups[i]); });
+  });
+}
+
+/// Calls f(first, groups) for runs of groups in order, which have no positions yet: the number of
+/// the first one and all of them.
+template <class F>
+void SimplifyStage::for_each_run(TriangleGroups& groups, F&& f) {
   for (std::size_t first = 0; first < groups.count(); first += kGroupsAtOnce) {
     check_cancelled();
     const std::size_t count = std::min(kGroupsAtOnce, groups.count() - first);
-    std::vector<TriangleGroup> loaded;
+    std::vector<TriangleGroup> loaded(count);
     std::uint64_t bytes = 0;
     for (std::size_t i = 0; i < count; ++i) {
+      loaded[i].triangles = groups.load(first + i);
       bytes += groups.size(first + i) * sizeof(Triangle);
-      loaded.push_back(groups.load(first + i, mesh_.positions()));
     }
-    f(first, loaded, arena);
+    in_parallel(loaded, [](TriangleGroup& group) { number_vertices(group); });
+    f(first, loaded);
     progress().advance(bytes);
   }
 }
 
-/// Targets of groups at one common error, at which all have `target` triangles together.
-std::vector<std::uint64_t> SimplifyStage::plan_targets(TriangleGroups& groups,
-                                                       std::uint64_t target) {
-  const double share = static_cast<double>(target) / static_cast<double>(mesh_.size().triangles);
-  std::vector<ErrorCurve> curves(groups.count());
-  std::uint64_t all = 0;
-  for (std::size_t i = 0; i < groups.count(); ++i) all += groups.size(i);
-  const double ratio = std::min(share, static_cast<double>(target) / static_cast<double>(all));
-  for_each_group(
-      groups, [&](std::size_t first, std::vector<TriangleGroup>& loaded, tbb::task_arena& arena) {
-        arena.execute([&] {
-          tbb::parallel_for(std::size_t{0}, loaded.size(), [&](std::size_t i) {
-            const double least = ratio * static_cast<double>(loaded[i].triangles.size()) / 4;
-            curves[first + i] = curve_of(std::move(loaded[i]), least);
-          });
-        });
-      });
-  const auto total = [&](double error) {
-    double sum = 0;
-    for (const ErrorCurve& curve : curves) sum += curve.at(error);
-    return sum;
-  };
-  double lo = 0, hi = 0;
-  for (const ErrorCurve& curve : curves) hi = std::max(hi, curve.points.back().error);
-  for (int step = 0; step < 60; ++step) {
-    const double middle = 0.5 * (lo + hi);
-    (total(middle) > static_cast<double>(target) ? lo : hi) = middle;
-  }
-  std::vector<std::uint64_t> targets;
-  for (const ErrorCurve& curve : curves) targets.push_back(rounded(curve.at(hi)));
-  return targets;
+/// Finds the collapses of all groups, more than there should be.
+void SimplifyStage::find_collapses(TriangleGroups& groups, double part, double max_distance) {
+  collapses_.clear();
+  for_each_run(groups, [&](std::size_t, std::vector<TriangleGroup>& loaded) {
+    for (TriangleGroup& group : loaded)
+      for (const std::uint32_t v : group.vertices) group.positions.push_back(mesh_.positions()[v]);
+    std::vector<std::vector<Collapse>> found(loaded.size());
+    in_parallel(loaded, [&](const TriangleGroup& group) {
+      const double least = part / kReserve * static_cast<double>(group.triangles.size());
+      found[static_cast<std::size_t>(&group - loaded.data())] =
+          EdgeCollapse(group, max_distance).run(static_cast<std::size_t>(least));
+    });
+    for (const std::vector<Collapse>& collapses : found) collapses_.add(collapses);
+  });
 }
 
-void SimplifyStage::run_pass(TriangleGroups& groups, const std::vector<std::uint64_t>& targets,
-                             double max_distance) {
-  for_each_group(
-      groups, [&](std::size_t first, std::vector<TriangleGroup>& loaded, tbb::task_arena& arena) {
-        std::vector<SimplifiedGroup> simplified(loaded.size());
-        arena.execute([&] {
-          tbb::parallel_for(std::size_t{0}, loaded.size(), [&](std::size_t i) {
-            simplified[i] = simplify(loaded[i], {targets[first + i], max_distance});
-          });
-        });
-        for (std::size_t i = 0; i < loaded.size(); ++i)
-          for (const Triangle& t : simplified[i].triangles)
-            mesh_.triangles().push_back(
-                {loaded[i].vertices[t[0]], loaded[i].vertices[t[1]], loaded[i].vertices[t[2]]});
-      });
+/// Does the collapses of the smallest errors.
+void SimplifyStage::collapse(TriangleGroups& groups, std::uint64_t all, std::uint64_t wanted) {
+  collapses_.select((all - wanted + 1) / 2);  // each takes two triangles away
+  for_each_run(groups, [&](std::size_t first, std::vector<TriangleGroup>& loaded) {
+    for (std::size_t i = 0; i < loaded.size(); ++i)
+      for (const Triangle& t : collapsed(loaded[i], collapses_.load(first + i)))
+        mesh_.triangles().push_back(
+            {loaded[i].vertices[t[0]], loaded[i].vertices[t[1]], loaded[i].vertices[t[2]]});
+  });
 }
 
 void SimplifyStage::simplify_all() {
-  const std::uint64_t goal = target();
+  const std::uint64_t goal = goal_.value_or(0);
   const auto first = static_cast<double>(mesh_.triangles().size());
   const double ratio = static_cast<double>(goal) / first;
   const bool has_limit = simplification_.max_error > 0;
@@ -190,18 +143,16 @@ void SimplifyStage::simplify_all() {
     TriangleGroups groups(place_, sorted_memory_, kSplits[pass]);
     groups.sort(mesh_.positions(), bounds_, mesh_.triangles(), kGroupTriangles,
                 [this] { check_cancelled(); });
-    sorted_bytes_ = std::max(sorted_bytes_, groups.file_bytes());
     // One group has no borders that another pass could simplify.
     const bool is_last = groups.count() == 1 || pass + 1 == kSplits.size();
     const std::uint64_t wanted =
-        is_last || goal == 0 ? goal : rounded(first * std::pow(ratio, kGoals[pass]));
-    const bool has_plan = groups.count() > 1 && wanted > 0;
-    progress().begin("simplifying", (has_plan ? 2 : 1) * all * sizeof(Triangle));
-    const std::vector<std::uint64_t> targets =
-        has_plan ? plan_targets(groups, wanted)
-                 : std::vector<std::uint64_t>(groups.count(), wanted);
+        is_last || goal == 0 ? goal : std::min(all, rounded(first * std::pow(ratio, kGoals[pass])));
     const double share = is_last && pass == 0 ? 1 : kErrorShares[pass];
-    run_pass(groups, targets, has_limit ? share * simplification_.max_error : kAnyDistance);
+    progress().begin("simplifying", 2 * all * sizeof(Triangle));
+    find_collapses(groups, static_cast<double>(wanted) / static_cast<double>(all),
+                   has_limit ? share * simplification_.max_error : kAnyDistance);
+    collapse(groups, all, wanted);
+    sorted_bytes_ = std::max(sorted_bytes_, groups.file_bytes() + collapses_.file_bytes());
     progress().end();
     if (is_last) break;
   }
@@ -242,11 +193,13 @@ void SimplifyStage::write_kept() {
 }
 
 void SimplifyStage::finish() {
-  if (target() < mesh_.size().triangles) {
+  goal_ = find_goal();
+  if (goal_.value_or(0) < mesh_.size().triangles) {
     simplify_all();
     write_kept();
     mesh_.release();
     numbers_.release();
+    collapses_.release();
   } else {
     mesh_.replay_and_release(next());
   }

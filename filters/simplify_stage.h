@@ -1,9 +1,13 @@
 #pragma once
 
+#include <tbb/task_arena.h>
+
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include <isobrick/progress.h>
+#include "filters/collapse_spool.h"
 #include "filters/filter_stage.h"
 #include "filters/mesh_spool.h"
 #include "filters/triangle_groups.h"
@@ -21,10 +25,11 @@ struct Simplification {
 
 /// Passes a simplified mesh on, whatever its size.
 ///
-/// Triangles are sorted into groups of boxes, and each group is simplified by itself. Vertices on
-/// the borders of groups stay, so neighbours fit together. Two more passes, with other boxes,
-/// simplify what the first ones left along the borders. Kept vertices keep their place, normal and
-/// order.
+/// Triangles are sorted into groups of boxes, and the edges of each group collapse by themselves:
+/// EdgeCollapse. Of all collapses those of the smallest errors are done, wherever they are.
+/// Vertices on the borders of groups stay, so neighbours fit together. Two more passes, with other
+/// boxes, simplify what the first ones left along the borders. Kept vertices keep their place,
+/// normal and order.
 class SimplifyStage final : public FilterStage {
  public:
   SimplifyStage(MeshSink& next, std::stop_token cancel, const ScratchPlace& place,
@@ -34,6 +39,9 @@ class SimplifyStage final : public FilterStage {
   void write(const MeshChunk& chunk) override;
   void finish() override;
 
+  /// Triangles that it aimed at, after finish(); nothing where only the error decides.
+  std::optional<std::uint64_t> goal() const { return goal_; }
+
  private:
   std::uint64_t own_bytes() const override {
     return mesh_.bytes() + sorted_bytes_ + numbers_.file_bytes();
@@ -42,22 +50,26 @@ class SimplifyStage final : public FilterStage {
   Progress& progress() {
     return simplification_.progress ? *simplification_.progress : no_progress();
   }
-  std::uint64_t target() const;
+  std::optional<std::uint64_t> find_goal() const;
   void simplify_all();
-  void run_pass(TriangleGroups& groups, const std::vector<std::uint64_t>& targets,
-                double max_distance);
-  std::vector<std::uint64_t> plan_targets(TriangleGroups& groups, std::uint64_t target);
+  void find_collapses(TriangleGroups& groups, double part, double max_distance);
+  void collapse(TriangleGroups& groups, std::uint64_t all, std::uint64_t wanted);
   template <class F>
-  void for_each_group(TriangleGroups& groups, F&& f);
+  void in_parallel(std::vector<TriangleGroup>& groups, F&& f);
+  template <class F>
+  void for_each_run(TriangleGroups& groups, F&& f);
   void write_kept();
 
   Simplification simplification_;
+  tbb::task_arena arena_;
   ScratchPlace place_;
   std::uint64_t sorted_memory_;
   std::uint64_t sorted_bytes_ = 0;
   MeshSpool mesh_;
+  CollapseSpool collapses_;
   ScratchArray<std::uint32_t> numbers_;  ///< of kept vertices plus 1; 0: not kept
   MeshBounds bounds_;
+  std::optional<std::uint64_t> goal_;
 };
 
 }  // namespace isobrick

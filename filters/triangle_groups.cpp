@@ -94,25 +94,26 @@ void TriangleGroups::sort(ScratchArray<Vec3f>& positions, const MeshBounds& boun
   triangles.clear();
 }
 
-TriangleGroup TriangleGroups::load(std::size_t group, ScratchArray<Vec3f>& positions) {
-  TriangleGroup loaded;
-  loaded.triangles.reserve(static_cast<std::size_t>(size(group)));
+std::vector<Triangle> TriangleGroups::load(std::size_t group) {
+  std::vector<Triangle> loaded;
+  loaded.reserve(static_cast<std::size_t>(size(group)));
   sorted_.for_each_run(begin_[group], begin_[group + 1],
                        [&](std::span<const Triangle> run, std::uint64_t) {
-                         loaded.triangles.insert(loaded.triangles.end(), run.begin(), run.end());
+                         loaded.insert(loaded.end(), run.begin(), run.end());
                        });
-  for (const Triangle& t : loaded.triangles)
-    loaded.vertices.insert(loaded.vertices.end(), t.begin(), t.end());
-  std::sort(loaded.vertices.begin(), loaded.vertices.end());
-  loaded.vertices.erase(std::unique(loaded.vertices.begin(), loaded.vertices.end()),
-                        loaded.vertices.end());
-  for (const std::uint32_t v : loaded.vertices) loaded.positions.push_back(positions[v]);
-  for (Triangle& t : loaded.triangles)
-    for (std::uint32_t& v : t)
-      v = static_cast<std::uint32_t>(
-          std::lower_bound(loaded.vertices.begin(), loaded.vertices.end(), v) -
-          loaded.vertices.begin());
   return loaded;
+}
+
+void number_vertices(TriangleGroup& group) {
+  std::vector<std::uint32_t>& vertices = group.vertices;
+  vertices.clear();
+  vertices.reserve(3 * group.triangles.size());
+  for (const Triangle& t : group.triangles) vertices.insert(vertices.end(), t.begin(), t.end());
+  std::ranges::sort(vertices);
+  vertices.erase(std::unique(vertices.begin(), vertices.end()), vertices.end());
+  for (Triangle& t : group.triangles)
+    for (std::uint32_t& v : t)
+      v = static_cast<std::uint32_t>(std::ranges::lower_bound(vertices, v) - vertices.begin());
 }
 
 }  // namespace isobrick

@@ -6,7 +6,7 @@
 
 #include <isobrick/mesh.h>
 #include "filters/scratch_array.h"
-#include "filters/simplify_group.h"
+#include "filters/triangle_group.h"
 
 namespace isobrick::inline v0 {
 
@@ -29,8 +29,8 @@ class TriangleGroups {
   std::size_t count() const { return begin_.empty() ? 0 : begin_.size() - 1; }
   /// Triangles of a group.
   std::uint64_t size(std::size_t group) const { return begin_[group + 1] - begin_[group]; }
-  /// The triangles of a group and what they name.
-  TriangleGroup load(std::size_t group, ScratchArray<Vec3f>& positions);
+  /// The triangles of a group, with their vertices' numbers in the mesh.
+  std::vector<Triangle> load(std::size_t group);
 
   std::uint64_t file_bytes() const { return sorted_.file_bytes(); }
   std::uint64_t memory() const { return sorted_.memory(); }

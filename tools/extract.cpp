@@ -83,6 +83,13 @@ std::string why_empty(const ExtractOptions& options, const ExtractReport& report
   return empty + "; " + range_text(store, options.level);
 }
 
+/// Whether a simplification left clearly more triangles than it was to.
+bool misses_goal(const ExtractReport& report, const FilteredSurface& filtered) {
+  constexpr double kTolerance = 1.05;
+  return filtered.simplify_goal && static_cast<double>(report.triangles) >
+                                       kTolerance * static_cast<double>(*filtered.simplify_goal);
+}
+
 struct SurfaceReports {
   std::vector<ExtractReport> reports;  ///< of each mesh, or of the picture where there is no mesh
   std::vector<FilteredSurface> filtered;
@@ -117,6 +124,7 @@ SurfaceReports make(const std::vector<ExtractedSurface>& surfaces, const std::ve
       report.vertices = filter->size().vertices;
       report.triangles = filter->size().triangles;
       filtered.measure = filter->measure();
+      filtered.simplify_goal = filter->simplify_goal();
     }
     made.reports.push_back(report);
     made.filtered.push_back(filtered);
@@ -161,6 +169,11 @@ CommandOutput make_all(const ExtractArguments& arguments,
     const FilteredSurface& filtered = made.filtered[i];
     if (report.triangles == 0)
       console.note(why_empty(surfaces[i].options, report, filtered, store));
+    if (misses_goal(report, filtered))
+      console.note(fmt::format(
+          "{} triangles are left instead of {}: components, handles and borders stay, and what "
+          "--max-error does not permit",
+          report.triangles, *filtered.simplify_goal));
     const std::uint64_t bytes = !sinks[i].mesh ? 0
                                 : is_standard_output(arguments.output)
                                     ? sinks[i].mesh->bytes()

@@ -98,6 +98,7 @@ ordered_json report_json(const ExtractedSurface& surface, const ExtractReport& r
   if (surface.filter.changes_mesh())
     object["extracted"] = {{"triangles", filtered.extracted.triangles},
                            {"vertices", filtered.extracted.vertices}};
+  if (filtered.simplify_goal) object["simplify_goal"] = *filtered.simplify_goal;
   if (filtered.measure) object["measure"] = measure_json(*filtered.measure);
   if (!surface.output.empty()) object["output"] = surface.output.string();
   if (!surface.preview.empty()) object["preview"] = surface.preview.string();

@@ -28,8 +28,9 @@ struct ExtractedSurface {
 
 /// What became of a surface on its way to its file.
 struct FilteredSurface {
-  MeshSize extracted;                  ///< before the filters that change the mesh
-  std::optional<MeshMeasure> measure;  ///< where that was requested
+  MeshSize extracted;                          ///< before the filters that change the mesh
+  std::optional<MeshMeasure> measure;          ///< where that was requested
+  std::optional<std::uint64_t> simplify_goal;  ///< in triangles, where there is one
 };
 
 /// What is expected of a surface, for --json and for people.

@@ -113,6 +113,10 @@ class ISOBRICK_API MeshFilter final : public MeshSink {
   MeshSize size() const;
   /// Of the mesh that left, after finish(), if that was requested.
   std::optional<MeshMeasure> measure() const;
+  /// Triangles that the simplification aimed at, after finish(): more are left where `max_error`,
+  /// or components, handles and borders, which stay, need them. Nothing where only `max_error`
+  /// decides.
+  std::optional<std::uint64_t> simplify_goal() const;
 
  private:
   class Stages;

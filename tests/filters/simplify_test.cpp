@@ -7,7 +7,7 @@
 
 #include <isobrick/error.h>
 #include "core/vectors.h"
-#include "filters/simplify_group.h"
+#include "tests/filters/far_triangles.h"
 #include "tests/filters/filter_fixture.h"
 
 namespace isobrick::test {
@@ -71,29 +71,13 @@ bool is_part_of(const Mesh& part, const Mesh& whole) {
   });
 }
 
-TEST(SimplifyGroup, DistancesToTriangles) {
-  const std::vector<Vec3f> positions{{0, 0, 0}, {2, 0, 0},   {0, 2, 0}, {0.5f, 0.5f, 1},
-                                     {3, 0, 0}, {-1, -1, 0}, {2, 2, 0}};
-  const std::vector<Triangle> to{{0, 1, 2}};
-  const auto near = [&](std::uint32_t v, double distance) {
-    return far_triangles(positions, {{v, v, v}}, to, distance).empty();
-  };
-  for (const auto& [vertex, distance] :
-       {std::pair(3U, 1.0), std::pair(4U, 1.0), std::pair(5U, std::sqrt(2.0)),
-        std::pair(6U, std::sqrt(2.0))}) {
-    EXPECT_TRUE(near(vertex, distance * 1.001)) << vertex;
-    EXPECT_FALSE(near(vertex, distance * 0.999)) << vertex;
-  }
-  EXPECT_EQ(far_triangles(positions, {{0, 0, 0}}, {}, 1e9).size(), 1U);
-}
-
 TEST(Simplify, ReachesItsGoal) {
   const Mesh mesh = bumpy();
   ASSERT_GT(mesh.triangles.size(), 60000U);
   for (const double ratio : {0.5, 0.1, 0.02}) {
     const Filtered simple = filtered(mesh, {.simplify_ratio = ratio, .measure = true});
     const double expected = ratio * static_cast<double>(mesh.triangles.size());
-    EXPECT_NEAR(static_cast<double>(simple.size.triangles), expected, 0.03 * expected) << ratio;
+    EXPECT_NEAR(static_cast<double>(simple.size.triangles), expected, 2) << ratio;
     EXPECT_TRUE(simple.measure->is_closed()) << ratio;
     EXPECT_EQ(simple.measure->euler_number, 2) << ratio;
     EXPECT_EQ(simple.measure->vertices, simple.mesh.positions.size()) << ratio;
@@ -102,7 +86,7 @@ TEST(Simplify, ReachesItsGoal) {
     EXPECT_NEAR(*simple.measure->volume, *measure(mesh).volume, 0.01 * *measure(mesh).volume);
   }
   EXPECT_NEAR(static_cast<double>(filtered(mesh, {.simplify_triangles = 5000}).size.triangles),
-              5000, 150);
+              5000, 2);
 }
 
 TEST(Simplify, SeveralGroupsHaveNoSeam) {
@@ -110,7 +94,7 @@ TEST(Simplify, SeveralGroupsHaveNoSeam) {
   ASSERT_GT(mesh.triangles.size(), 300000U);
   const Filtered simple = filtered(mesh, {.simplify_ratio = 0.05, .measure = true});
   const double expected = 0.05 * static_cast<double>(mesh.triangles.size());
-  EXPECT_NEAR(static_cast<double>(simple.size.triangles), expected, 0.03 * expected);
+  EXPECT_NEAR(static_cast<double>(simple.size.triangles), expected, 2);
   EXPECT_TRUE(simple.measure->is_closed());
   EXPECT_EQ(simple.measure->euler_number, 2);
   // Where groups met there is no chain of the short sides of the original.
@@ -136,8 +120,7 @@ TEST(Simplify, KeepsToTheError) {
   // One that it does is not exceeded.
   const Filtered reached = filtered(mesh, {.simplify_ratio = 0.5, .max_error = 0.01});
   EXPECT_NEAR(static_cast<double>(reached.size.triangles),
-              0.5 * static_cast<double>(mesh.triangles.size()),
-              0.02 * static_cast<double>(mesh.triangles.size()));
+              0.5 * static_cast<double>(mesh.triangles.size()), 2);
 }
 
 TEST(Simplify, HandlesAndComponentsStay) {
@@ -148,6 +131,7 @@ TEST(Simplify, HandlesAndComponentsStay) {
   const MeshMeasure before = measure(balls),
                     after = *filtered(balls, {.simplify_ratio = 0.5, .measure = true}).measure;
   EXPECT_EQ(after.components, before.components);
+  EXPECT_EQ(after.euler_number, before.euler_number);
   EXPECT_EQ(after.open_sides, before.open_sides);  // where the border cuts balls
 }
 
