@@ -8,10 +8,12 @@
 #include <fmt/format.h>
 
 #include <isobrick/error.h>
+#include "core/length_unit.h"
 #include "filters/component_stage.h"
 #include "filters/measure_stage.h"
 #include "filters/simplify_stage.h"
 #include "filters/smooth_stage.h"
+#include "filters/unit_stage.h"
 #include "filters/unweld_stage.h"
 
 namespace isobrick::inline v0 {
@@ -90,6 +92,9 @@ void check_filters(const MeshFilterOptions& options) {
   if (!(options.max_error >= 0 && std::isfinite(options.max_error)))
     throw UsageError(
         fmt::format("the error of a simplification must be a length, not {}", options.max_error));
+  if (!options.unit.empty() && unit_name(options.unit) != options.unit)
+    throw UsageError(
+        fmt::format("'{}' is no unit of length; it is one of {}", options.unit, unit_names()));
 }
 
 std::uint64_t filter_scratch_bytes(const MeshFilterOptions& options, MeshSize mesh,
@@ -111,7 +116,8 @@ class MeshFilter::Stages {
   Stages(MeshSink& sink, const MeshFilterOptions& options)
       : place_{.beside = options.scratch_beside.string()}, cancel_(options.cancel), first_(&sink) {
     check_filters(options);
-    const bool unwelds = options.any() && sink.indexing() == Indexing::chunk_local;
+    const bool unwelds =
+        (options.changes_mesh() || options.measure) && sink.indexing() == Indexing::chunk_local;
     const int shares = int{unwelds} + int{options.measure} + int{options.smooth > 0} +
                        int{options.simplifies()} + int{chooses_components(options)};
     memory_ = options.memory / static_cast<std::uint64_t>(std::max(1, shares));
@@ -119,6 +125,7 @@ class MeshFilter::Stages {
     if (unwelds) add<UnweldStage>(place_, memory_);
     count_ = &add<CountStage>(first_->indexing());
     if (options.measure) measure_ = &add<MeasureStage>(place_, memory_);
+    if (!options.unit.empty()) add<UnitStage>(options.unit);
     if (options.simplifies())
       simplify_ =
           &add<SimplifyStage>(place_, memory_,

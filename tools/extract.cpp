@@ -67,6 +67,7 @@ std::vector<Sinks> open_sinks(const std::vector<ExtractedSurface>& surfaces,
     if (surfaces.size() * arguments.outputs() == 1) filter.progress = &progress;
     of_surface.mesh_filter = filter_before(of_surface.mesh.get(), filter, surface.output);
     filter.measure = filter.measure && !of_surface.mesh;  // once is enough
+    filter.unit.clear();                                  // cameras know the volume's
     of_surface.preview_filter = filter_before(of_surface.preview.get(), filter, surface.preview);
   }
   return sinks;
@@ -196,7 +197,8 @@ void note_band(double isovalue, const StoreInfo& info, Console& console) {
       isovalue, -*band, *band));
 }
 
-int run_extract(const ExtractArguments& arguments, Console& console) {
+int run_extract(const ExtractArguments& given, Console& console) {
+  ExtractArguments arguments = with_preset(given);
   check_arguments(arguments);
   const bool streams =
       is_standard_output(arguments.output) || is_standard_output(arguments.preview.path);
@@ -205,6 +207,7 @@ int run_extract(const ExtractArguments& arguments, Console& console) {
   const OpenedVolume input =
       open_input(arguments.input, arguments.memory, arguments.threads, console);
   const StoreReader& store = input.store();
+  check_mesh_unit(arguments, store, console);
   const std::vector<ExtractedSurface> surfaces = plan_surfaces(arguments, store, console);
   for (const ExtractedSurface& surface : surfaces)
     note_band(surface.options.isovalue, store.info(), console);
@@ -312,6 +315,15 @@ void add_extract(Program& program) {
            "Close the surface at the border of the volume or region and around missing samples (on "
            "the CPU)");
   add_filters(app, arguments->filters);
+  add_text(
+      app,
+      {"--preset", "print",
+       "For 3-D printing: --cap --largest 1 --smooth 10 --simplify 500k --mesh-unit mm, as STL; "
+       "what is given otherwise stays"},
+      [&for_print = arguments->for_print](const std::string& text) {
+        if (text != "print") throw UsageError(fmt::format("'{}' is no preset; it is print", text));
+        for_print = true;
+      });
   add_search(app, arguments->search);
   add_memory(app, arguments->memory);
   add_threads(app, arguments->threads);

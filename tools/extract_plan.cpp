@@ -237,6 +237,26 @@ std::string shortage_text(const PlannedMesh& mesh, const Shortage& shortage, boo
 
 }  // namespace
 
+ExtractArguments with_preset(ExtractArguments arguments) {
+  if (!arguments.for_print) return arguments;
+  arguments.cap = true;
+  set_for_print(arguments.filters);
+  const bool is_named = !arguments.output.empty() && !is_standard_output(arguments.output);
+  if (!is_named && !arguments.format) arguments.format = MeshFormat::stl;
+  return arguments;
+}
+
+void check_mesh_unit(ExtractArguments& arguments, const StoreReader& store, Console& console) {
+  std::string& unit = arguments.filters.unit;
+  if (unit.empty() || !store.info().levels.front().transform.unit.empty()) return;
+  if (!arguments.for_print)
+    throw UsageError(
+        "--mesh-unit: the volume does not say its unit of length; convert it with --unit");
+  console.note(
+      "the volume does not say its unit of length, so the mesh is as if it were millimetres");
+  unit.clear();
+}
+
 void check_arguments(const ExtractArguments& arguments) {
   for (const std::string& output : {arguments.output, arguments.preview.path})
     refuse_url_output(output);

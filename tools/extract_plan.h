@@ -32,6 +32,7 @@ struct ExtractArguments {
   bool drop_degenerate = false;
   Topology topology = Topology::consistent;
   bool cap = false;
+  bool for_print = false;  ///< --preset print
   std::uint64_t memory = std::uint64_t{1} << 30;
   int threads = 0;
   IndexChoice search;
@@ -45,6 +46,13 @@ struct ExtractArguments {
   /// Meshes and pictures of one surface.
   std::size_t outputs() const { return std::size_t{writes_mesh()} + !preview.path.empty(); }
 };
+
+/// What a preset adds to arguments that are not given.
+ExtractArguments with_preset(ExtractArguments arguments);
+
+/// Takes the unit of the mesh from a preset back where the volume's unit is not known, and says so.
+/// Throws UsageError where it was requested.
+void check_mesh_unit(ExtractArguments& arguments, const StoreReader& store, Console& console);
 
 /// Throws UsageError for arguments that contradict each other, before anything is opened.
 void check_arguments(const ExtractArguments& arguments);

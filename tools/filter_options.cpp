@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include <isobrick/error.h>
+#include "core/length_unit.h"
 #include "tools/parse.h"
 
 namespace isobrick::tools {
@@ -31,6 +32,13 @@ double parse_length(const std::string& text) {
   if (!(length > 0 && std::isfinite(length)))
     throw UsageError(fmt::format("'{}' is no error: a length above 0", text));
   return length;
+}
+
+std::string parse_unit(const std::string& text) {
+  std::string name = unit_name(text);
+  if (name.empty())
+    throw UsageError(fmt::format("'{}' is no unit of length; it is one of {}", text, unit_names()));
+  return name;
 }
 
 }  // namespace
@@ -59,8 +67,20 @@ void add_filters(CLI::App* app, FilterArguments& filters) {
              {"--max-error", "LENGTH",
               "Of a simplified mesh: how far it may be from the original, in the unit of world "
               "space; without --simplify as few triangles as this permits"});
+  add_parsed(
+      app, filters.unit, parse_unit,
+      {"--mesh-unit", "NAME", "Unit of the mesh, such as mm or micrometer", "that of the volume"});
   add_flag(app, "--measure", filters.measure,
            "Report area, enclosed volume, bounds, components and Euler number of the mesh");
+}
+
+void set_for_print(FilterArguments& filters) {
+  constexpr int kIterations = 10;
+  constexpr std::uint64_t kTriangles = 500'000;
+  if (filters.min_component == 0 && filters.largest == 0) filters.largest = 1;
+  if (filters.smooth == 0) filters.smooth = kIterations;
+  if (!filter_options(filters).simplifies()) filters.simplify_triangles = kTriangles;
+  if (filters.unit.empty()) filters.unit = "millimeter";
 }
 
 void check_filters(const FilterArguments& filters, bool estimates) {
@@ -80,6 +100,7 @@ MeshFilterOptions filter_options(const FilterArguments& filters) {
                             .simplify_ratio = filters.simplify_ratio,
                             .simplify_triangles = filters.simplify_triangles,
                             .max_error = filters.max_error,
+                            .unit = filters.unit,
                             .measure = filters.measure};
   if (filters.pass_band) options.pass_band = *filters.pass_band;
   return options;

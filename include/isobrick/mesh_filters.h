@@ -50,18 +50,22 @@ struct MeshFilterOptions {
   double pass_band = 0.1;
   /// Simplifies to so many triangles, a part of those that there are in (0, 1]; 1: all. Edges
   /// collapse onto one of their ends, by the quadric error (Garland & Heckbert 1997). Flat parts
-  /// lose more than others. Borders of the surface stay. About a percent may be missing at the
-  /// goal, more where borders or `max_error` are in the way.
+  /// lose more than others. The topology and the borders of the surface stay: components, handles
+  /// and holes are those from before. More are left where these or `max_error` are in the way.
   double simplify_ratio = 1;
   /// The same as a number of triangles; in place of the ratio where it is not 0.
   std::uint64_t simplify_triangles = 0;
   /// Of the simplification: how far, in world units, vertices and centres of the triangles before
   /// may be from the surface after it. 0: any. Without a goal it simplifies as far as this permits.
   double max_error = 0;
+  /// Unit of the mesh that leaves, such as "millimeter"; empty: that of the mesh that enters.
+  /// begin() throws UsageError if that one is not known. Lengths above are in the unit before,
+  /// measures in the unit after.
+  std::string unit = {};
   bool measure = false;  ///< MeshFilter::measure()
   int threads = 0;       ///< of simplification, 0: all cores; never shows in the mesh
   /// Bytes that all filters hold at most; what does not fit lies in scratch files. Simplification
-  /// takes 80 MiB more for the groups that it works on.
+  /// takes 120 MiB more for the groups that it works on.
   std::uint64_t memory = std::uint64_t{256} << 20;
   /// The file beside which scratch files lie; "-": in the folder of temporary files.
   std::filesystem::path scratch_beside = "-";
@@ -79,7 +83,7 @@ struct MeshFilterOptions {
   /// Whether triangles are to become fewer.
   bool simplifies() const { return simplify_ratio < 1 || simplify_triangles > 0 || max_error > 0; }
   /// Whether there is anything to do.
-  bool any() const { return changes_mesh() || measure; }
+  bool any() const { return changes_mesh() || measure || !unit.empty(); }
 };
 
 /// Throws UsageError for options that make no sense.

@@ -1,4 +1,5 @@
 #include <cmath>
+#include <cstring>
 
 #include "tests/tools/program.h"
 
@@ -184,6 +185,53 @@ TEST_F(Filter, DrawsTheFilteredSurface) {
   // Beside a mesh the same picture.
   ASSERT_EQ(draw("beside.png", {"-o", path("beside.ply"), "--largest", "1"}).exit_code, 0);
   EXPECT_EQ(read_file(path("beside.png")), read_file(path("largest.png")));
+}
+
+TEST_F(Filter, ChangesTheUnit) {
+  const nlohmann::json plain = of_noise("plain.stl", {"--measure"})["measure"],
+                       scaled =
+                           of_noise("scaled.stl", {"--measure", "--mesh-unit", "um"})["measure"];
+  EXPECT_EQ(plain["unit"], "millimeter");
+  EXPECT_EQ(scaled["unit"], "micrometer");
+  EXPECT_NEAR(scaled["area"].get<double>(), 1e6 * plain["area"].get<double>(),
+              1 * plain["area"].get<double>());
+  // GLB is in metres, whatever the unit of the mesh.
+  of_noise("scaled.glb", {"--mesh-unit", "cm"});
+  EXPECT_NE(read_file(path("scaled.glb")).find("\"scale\":[0.01,"), std::string::npos);
+  expect_refused(refused({"--mesh-unit", "mm"}), 2, {"--mesh-unit", "--unit"});
+  expect_refused(refused({"--mesh-unit", "furlong"}), 2, {"--mesh-unit", "furlong"});
+}
+
+TEST_F(Filter, IsSetByThePresetForPrinting) {
+  const std::string store = path("noise.zarr");
+  const Arguments words{"extract", store, "--isovalue", "250.5", "--preset", "print", "--measure"};
+  Arguments named = words;
+  named.insert(named.end(), {"-o", path("print.stl")});
+  const nlohmann::json surface = run_json(named)["surfaces"][0];
+  EXPECT_EQ(surface["measure"]["closed"], true);
+  EXPECT_EQ(surface["measure"]["components"], 1);
+  EXPECT_EQ(surface["measure"]["unit"], "millimeter");
+  EXPECT_EQ(surface["simplify_goal"], 500000);
+  const Arguments same{"--cap",      "--largest", "1",           "--smooth", "10",
+                       "--simplify", "500k",      "--mesh-unit", "mm"};
+  extract(store, "250.5", "options.stl", same);
+  EXPECT_EQ(read_file(path("options.stl")), read_file(path("print.stl")));
+  // What is given stays.
+  Arguments fewer = named;
+  fewer.insert(fewer.end(), {"--simplify", "50%", "--force", "--mesh-unit", "m"});
+  const nlohmann::json half = run_json(fewer)["surfaces"][0];
+  EXPECT_EQ(half["measure"]["unit"], "meter");
+  EXPECT_LT(half["triangles"], surface["triangles"]);
+  // Without a name it is an STL all the same; without a unit there is a note.
+  const Outcome streamed =
+      run({"extract", store_, "--isovalue", "127.5", "--preset", "print", "-o", "-"});
+  EXPECT_EQ(streamed.exit_code, 0);
+  EXPECT_NE(streamed.err.find("as if it were millimetres"), std::string::npos) << streamed.err;
+  std::uint32_t triangles = 0;
+  ASSERT_GT(streamed.out.size(), 84U);
+  std::memcpy(&triangles, streamed.out.data() + 80, 4);
+  EXPECT_EQ(streamed.out.size(), 84 + 50 * std::size_t{triangles});
+  expect_refused(refused({"--preset", "paper"}), 2, {"--preset", "paper", "print"});
 }
 
 TEST_F(Filter, RefusesWhatMakesNoSense) {
