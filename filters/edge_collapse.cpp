@@ -89,7 +89,8 @@ void EdgeCollapse::sum_planes(const std::vector<Triangle>& triangles) {
 float EdgeCollapse::cost(std::uint32_t from, std::uint32_t to) const {
   const Vec3d p = vertices_[to].position;
   const double planes = std::max(0.0, vertices_[from].quadric.at(p) + vertices_[to].quadric.at(p));
-  return static_cast<float>(planes + kLengthWeight * square(p - vertices_[from].position));
+  const double sum = planes + kLengthWeight * square(p - vertices_[from].position);
+  return std::isfinite(sum) ? static_cast<float>(sum) : kNowhere.cost;
 }
 
 void EdgeCollapse::push(std::uint32_t from, Target target) {

@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include <isobrick/error.h>
+#include <isobrick/mesh_sinks.h>
 #include "core/length_unit.h"
 #include "filters/component_stage.h"
 #include "filters/measure_stage.h"
@@ -182,6 +183,23 @@ std::uint64_t MeshFilter::memory() const { return stages_->first().memory(); }
 MeshSize MeshFilter::size() const { return stages_->size(); }
 std::optional<MeshMeasure> MeshFilter::measure() const { return stages_->measure(); }
 std::optional<std::uint64_t> MeshFilter::simplify_goal() const { return stages_->simplify_goal(); }
+
+Mesh apply_filters(const Mesh& mesh, const MeshFilterOptions& options) {
+  check_numbers(mesh);
+  if (!mesh.normals.empty() && mesh.normals.size() != mesh.positions.size())
+    throw UsageError(fmt::format("the mesh has {} normals, but {} vertices", mesh.normals.size(),
+                                 mesh.positions.size()));
+  MeshFilterOptions in_memory = options;
+  in_memory.memory = kAllMemory;
+  in_memory.measure = false;
+  Mesh result;
+  MemorySink sink(result);
+  MeshFilter filter(sink, in_memory);
+  filter.begin({.has_normals = !mesh.normals.empty(), .unit = mesh.unit});
+  filter.write(mesh.chunk());
+  filter.finish();
+  return result;
+}
 
 MeshMeasure measure(const Mesh& mesh) {
   check_numbers(mesh);

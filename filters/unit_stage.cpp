@@ -11,8 +11,8 @@ namespace isobrick::inline v0 {
 void UnitStage::begin(const MeshHeader& header) {
   const auto ratio = unit_ratio(header.unit, unit_);
   if (!ratio)
-    throw UsageError(fmt::format(
-        "the mesh cannot be in {}s: the volume does not say its unit of length", unit_));
+    throw UsageError(
+        fmt::format("the mesh cannot be in {}s: its own unit of length is not known", unit_));
   ratio_ = *ratio;
   MeshHeader scaled = header;
   scaled.unit = unit_;

@@ -127,6 +127,12 @@ class ISOBRICK_API MeshFilter final : public MeshSink {
   std::unique_ptr<Stages> stages_;
 };
 
+/// Filters a mesh in memory, also one of another program. Both meshes and what the filters hold are
+/// in memory; MeshFilterOptions::measure does nothing. Throws as check_filters() does, and
+/// UsageError where a triangle names a vertex that is not there or the normals are not as many as
+/// the vertices.
+ISOBRICK_API Mesh apply_filters(const Mesh& mesh, const MeshFilterOptions& options);
+
 /// Measures a mesh in memory. Throws UsageError where a triangle names a vertex that is not there.
 ISOBRICK_API MeshMeasure measure(const Mesh& mesh);
 

@@ -66,6 +66,19 @@ class Mesh:
         quantize: bool = False,
         progress: _Progress = None,
     ) -> None: ...
+    def filtered(
+        self,
+        *,
+        min_component: int = 0,
+        largest: int = 0,
+        smooth: int = 0,
+        pass_band: float = 0.1,
+        simplify: Union[int, float, None] = None,
+        max_error: Optional[float] = None,
+        unit: str = "",
+        threads: int = 0,
+        progress: _Progress = None,
+    ) -> Mesh: ...
     def measure(self) -> Measure: ...
     def to_trimesh(self) -> Any: ...
     def to_vtk(self) -> Any: ...

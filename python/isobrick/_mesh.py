@@ -6,7 +6,7 @@ from typing import Optional
 import numpy as np
 
 from . import _isobrick
-from ._arguments import mesh_file_options, path_text, unit_text
+from ._arguments import filter_options, mesh_file_options, path_text, unit_text
 from ._progress import reporting
 
 
@@ -134,6 +134,45 @@ class Mesh:
         options = mesh_file_options(force=force, quantize=quantize)
         with reporting(progress) as report:
             self._native.save(path_text(path), options, report)
+
+    def filtered(
+        self, *, min_component=0, largest=0, smooth=0, pass_band=0.1, simplify=None,
+        max_error=None, unit="", threads=0, progress=None,
+    ):
+        """Another mesh, of components, smooth, simplified or in another unit, in this order.
+
+        Parameters
+        ----------
+        min_component : int
+            Drops components of fewer triangles.
+        largest : int
+            Keeps so many components, those with most triangles.
+        smooth : int
+            Iterations of Taubin's smoothing, which keeps the size. Borders stay where they are.
+        pass_band : float
+            Of the smoothing: what varies more along the surface goes, from 0, all, to 0.8, little.
+        simplify : float or int, optional
+            A part of the triangles, at most 1, or a number of them. The topology stays.
+        max_error : float, optional
+            Of the simplification: how far the surface may be from this one. Without `simplify`: as
+            few triangles as this permits.
+        unit : str
+            Of the other mesh, such as "mm"; "" is that of this one.
+        threads : int
+            0 means all cores. It never changes the mesh.
+        progress : function or tqdm, optional
+            A function of (stage, done, total) in bytes, a tqdm bar, or the class `tqdm`.
+
+        Works for meshes of other libraries too. Triangles share vertices by number: merge those at
+        the same place first. Smooth meshes have the normals of their triangles.
+        """
+        options = filter_options(
+            min_component=min_component, largest=largest, smooth=smooth, pass_band=pass_band,
+            simplify=simplify, max_error=max_error, threads=threads,
+        )
+        options.unit = unit_text(unit)
+        with reporting(progress) as report:
+            return Mesh._of(self._native.filtered(options, report))
 
     def measure(self):
         """Area, enclosed volume, components, Euler number and bounds, as a `Measure`."""

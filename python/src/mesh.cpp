@@ -157,6 +157,14 @@ void bind_mesh(py::module_& module) {
                                return std::pair(bounds.lo, bounds.hi);
                              })
       .def("write_to", &write_to)
+      .def("filtered",
+           [](const Mesh& mesh, MeshFilterOptions options, const py::object& callback) {
+             return interruptible(callback, [&](Reporter reporter) {
+               options.cancel = reporter.cancel;
+               options.progress = &reporter.progress;
+               return std::make_unique<Mesh>(apply_filters(mesh, options));
+             });
+           })
       .def("measure",
            [](const Mesh& mesh) {
              return describe(interruptible(py::none(), [&](Reporter) { return measure(mesh); }));

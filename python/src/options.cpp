@@ -68,6 +68,7 @@ void bind_mesh_filter_options(py::module_& module) {
       .def_readwrite("simplify_triangles", &MeshFilterOptions::simplify_triangles)
       .def_readwrite("max_error", &MeshFilterOptions::max_error)
       .def_readwrite("threads", &MeshFilterOptions::threads)
+      .def_readwrite("unit", &MeshFilterOptions::unit)
       .def_readwrite("measure", &MeshFilterOptions::measure)
       .def("any", &MeshFilterOptions::any);
 }

@@ -163,6 +163,19 @@ TEST(MeshFilter, WritesToSinksOfUnweldedChunks) {
   }
 }
 
+TEST(MeshFilter, OfAMeshInMemory) {
+  const Mesh mesh = debris(true);
+  for (const MeshFilterOptions& options :
+       {MeshFilterOptions{.largest = 40}, {.smooth = 3}, {.simplify_ratio = 0.3}, {}})
+    EXPECT_TRUE(same(apply_filters(mesh, options), filtered(mesh, options).mesh));
+  Mesh wrong = debris();
+  wrong.triangles[0][0] = 1u << 30;
+  EXPECT_THROW(apply_filters(wrong, {.smooth = 1}), UsageError);
+  Mesh few = debris(true);
+  few.normals.resize(3);
+  EXPECT_THROW(apply_filters(few, {.smooth = 1}), UsageError);
+}
+
 TEST(MeshFilter, EndsWhenItIsCancelled) {
   std::stop_source stop;
   Mesh result;

@@ -131,3 +131,42 @@ def test_simplified_meshes():
     for wrong in ({"simplify": 0}, {"simplify": 1.5}, {"simplify": -0.1}, {"max_error": 0}):
         with pytest.raises(isobrick.UsageError, match=next(iter(wrong))):
             isobrick.extract(field, 0.3, **wrong)
+
+
+def test_meshes_in_memory_are_filtered(field):
+    every = isobrick.extract(field, 0, spacing=SPACING, unit="mm")
+    for options in ({"largest": 1}, {"smooth": 5}, {"simplify": 0.2}, {"max_error": 0.002}):
+        expected = isobrick.extract(field, 0, spacing=SPACING, unit="mm", **options)
+        mesh = every.filtered(**options)
+        assert np.array_equal(mesh.vertices, expected.vertices), options
+        assert np.array_equal(mesh.faces, expected.faces), options
+        assert np.array_equal(mesh.normals, expected.normals), options
+        assert mesh.unit == "millimeter"
+    assert len(every.filtered(simplify=500)) in (499, 500)
+    metres = every.filtered(unit="m")
+    assert metres.unit == "meter"
+    assert np.allclose(metres.vertices * 1000, every.vertices)
+    assert np.array_equal(every.filtered().vertices, every.vertices)
+
+
+def test_meshes_of_others_are_filtered():
+    # A strip that is folded back on itself, twice the same triangle, one of two vertices, and a
+    # vertex that is no place.
+    vertices = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0], [2, 0, 0], [2, 1, 0], [np.nan, 0, 0]]
+    faces = [[0, 1, 2], [1, 3, 2], [1, 4, 3], [4, 5, 3], [0, 1, 2], [2, 1, 0], [4, 4, 5], [5, 4, 6]]
+    mesh = isobrick.Mesh(np.array(vertices), np.array(faces))
+    for options in ({"simplify": 0.1}, {"max_error": 5.0}, {"smooth": 3}, {"largest": 1}):
+        assert len(mesh.filtered(**options)) <= len(mesh)
+    random = np.random.default_rng(1)
+    soup = isobrick.Mesh(random.random((50, 3)), random.integers(0, 50, (400, 3)))
+    assert len(soup.filtered(simplify=0.1, smooth=2)) <= 400
+
+
+def test_filters_of_meshes_refuse_what_makes_no_sense(field):
+    mesh = isobrick.extract(field, 0)
+    for options in ({"simplify": 0}, {"simplify": 1.5}, {"largest": -1}, {"max_error": 0},
+                    {"unit": "furlong"}, {"largest": 1, "min_component": 2}):
+        with pytest.raises(UsageError):
+            mesh.filtered(**options)
+    with pytest.raises(UsageError, match="unit"):
+        mesh.filtered(unit="mm")  # of a mesh that has none
