@@ -172,9 +172,9 @@ CommandOutput make_all(const ExtractArguments& arguments,
       console.note(why_empty(surfaces[i].options, report, filtered, store));
     if (misses_goal(report, filtered))
       console.note(fmt::format(
-          "{} triangles are left instead of {}: components, handles and borders stay, and what "
-          "--max-error does not permit",
-          report.triangles, *filtered.simplify_goal));
+          "{} triangles are left instead of {}: components, handles and borders stay{}",
+          report.triangles, *filtered.simplify_goal,
+          surfaces[i].filter.max_error > 0 ? ", and what --max-error does not permit" : ""));
     const std::uint64_t bytes = !sinks[i].mesh ? 0
                                 : is_standard_output(arguments.output)
                                     ? sinks[i].mesh->bytes()

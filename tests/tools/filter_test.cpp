@@ -161,6 +161,11 @@ TEST_F(Filter, Simplifies) {
             all);
   EXPECT_EQ(extract(store_, "127.5", "fraction.ply", {"--simplify", "2.5k"})["simplify_goal"],
             2500);
+  const Outcome missed = run({"extract", path("noise.zarr"), "--isovalue", "250.5", "-o",
+                              path("few.ply"), "--simplify", "4"});
+  EXPECT_EQ(missed.exit_code, 0);
+  EXPECT_NE(missed.err.find("triangles are left instead of 4: components"), std::string::npos)
+      << missed.err;
   extract(store_, "127.5", "one.ply", {"--simplify", "1"});
   EXPECT_EQ(read_file(path("one.ply")), read_file(path("whole.ply")));
   for (const char* wrong : {"0", "1.5", "-0.1", "120%", "nan", "0.0"})
