@@ -22,7 +22,7 @@ const std::map<std::string, Names> kMayInclude = {
     {"io/vtk", {"core", "io/bytes"}},
     {"io/volumes", {"core", "io/bytes", "io/vtk"}},
     {"io/meshes", {"core", "io/bytes", "io/vtk", "isobrick/mesh.h"}},
-    {"filters", {"core", "io/bytes", "isobrick/mesh.h"}},
+    {"filters", {"core", "io/bytes", "isobrick/mesh.h", "isobrick/mesh_sinks.h"}},
     {"io/http", {"core", "io/bytes"}},
     {"bricks", {"core", "io/bytes", "io/http"}},
     {"index", {"core"}},
