@@ -14,9 +14,10 @@ namespace {
 
 /// Triangles of a group: more leave less to the later passes, fewer take less memory.
 constexpr std::uint64_t kGroupTriangles = 100000;
-/// Groups that are simplified at the same time, and what each takes.
-constexpr std::size_t kGroupsAtOnce = 4;
+/// What a group takes that is simplified, and how many are at the same time however small the
+/// memory is.
 constexpr std::uint64_t kGroupBytes = kGroupTriangles * 300;
+constexpr std::uint64_t kLeastAtOnce = 4;
 /// Where boxes are divided in each pass: no border of a pass is one of another.
 constexpr std::array<double, 3> kSplits{0.5, 0.37, 0.63};
 /// Of the way to the goal, on a logarithmic scale, where each pass ends. Were the first to go all
@@ -31,6 +32,13 @@ constexpr double kAnyDistance = std::numeric_limits<double>::infinity();
 
 std::uint64_t rounded(double count) { return static_cast<std::uint64_t>(std::llround(count)); }
 
+/// Groups at the same time, for which half of the memory is.
+std::size_t groups_at_once(int threads, std::uint64_t memory) {
+  const std::uint64_t most = std::max(kLeastAtOnce, memory / 2 / kGroupBytes);
+  return static_cast<std::size_t>(
+      std::clamp<std::uint64_t>(static_cast<std::uint64_t>(threads), kLeastAtOnce, most));
+}
+
 int threads_of(const Simplification& simplification) {
   const int most = tbb::info::default_concurrency();
   return simplification.threads > 0 ? std::min(simplification.threads, most) : most;
@@ -43,18 +51,19 @@ SimplifyStage::SimplifyStage(MeshSink& next, std::stop_token cancel, const Scrat
     : FilterStage(next, std::move(cancel)),
       simplification_(simplification),
       arena_(threads_of(simplification)),
+      at_once_(groups_at_once(threads_of(simplification), memory)),
       place_(place),
-      sorted_memory_(memory / 4),
-      mesh_(place, memory / 2),
-      collapses_(place, memory / 16),
-      numbers_(place, memory / 16) {
+      sorted_memory_(memory / 8),
+      mesh_(place, memory / 4),
+      collapses_(place, memory / 32),
+      numbers_(place, memory / 32) {
   constexpr double far = std::numeric_limits<double>::infinity();
   bounds_ = {{far, far, far}, {-far, -far, -far}};
 }
 
 std::uint64_t SimplifyStage::own_memory() const {
   return mesh_.memory() + sorted_memory_ + collapses_.memory() + numbers_.memory() +
-         kGroupsAtOnce * kGroupBytes;
+         at_once_ * kGroupBytes;
 }
 
 void SimplifyStage::begin(const MeshHeader& header) {
@@ -90,9 +99,9 @@ void SimplifyStage::in_parallel(std::vector<TriangleGroup>& groups, F&& f) {
 /// the first one and all of them.
 template <class F>
 void SimplifyStage::for_each_run(TriangleGroups& groups, F&& f) {
-  for (std::size_t first = 0; first < groups.count(); first += kGroupsAtOnce) {
+  for (std::size_t first = 0; first < groups.count(); first += at_once_) {
     check_cancelled();
-    const std::size_t count = std::min(kGroupsAtOnce, groups.count() - first);
+    const std::size_t count = std::min(at_once_, groups.count() - first);
     std::vector<TriangleGroup> loaded(count);
     std::uint64_t bytes = 0;
     for (std::size_t i = 0; i < count; ++i) {

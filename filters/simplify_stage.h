@@ -62,6 +62,7 @@ class SimplifyStage final : public FilterStage {
 
   Simplification simplification_;
   tbb::task_arena arena_;
+  std::size_t at_once_;  ///< groups
   ScratchPlace place_;
   std::uint64_t sorted_memory_;
   std::uint64_t sorted_bytes_ = 0;

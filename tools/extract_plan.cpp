@@ -162,6 +162,8 @@ std::vector<ExtractedSurface> surfaces_of_level(const ExtractArguments& argument
   options.level = level;
   options.roi = store_region(store, level, arguments.region);
   const MeshForm form = form_of(arguments);
+  MeshFilterOptions filter = filter_options(arguments.filters);
+  filter.threads = arguments.threads;
   std::vector<ExtractedSurface> surfaces;
   for (const double isovalue : isovalues) {
     options.isovalue = isovalue;
@@ -169,9 +171,8 @@ std::vector<ExtractedSurface> surfaces_of_level(const ExtractArguments& argument
         !arguments.output.empty() ? named(arguments.output, isovalue, isovalues.size())
         : arguments.writes_mesh() ? default_output(arguments, form.format, isovalue)
                                   : fs::path();
-    surfaces.push_back({options, form, output,
-                        named(arguments.preview.path, isovalue, isovalues.size()),
-                        filter_options(arguments.filters)});
+    surfaces.push_back(
+        {options, form, output, named(arguments.preview.path, isovalue, isovalues.size()), filter});
   }
   if (!arguments.estimate) share_filter_memory(surfaces, arguments, store);
   return surfaces;
