@@ -90,7 +90,7 @@ float EdgeCollapse::cost(std::uint32_t from, std::uint32_t to) const {
   const Vec3d p = vertices_[to].position;
   const double planes = std::max(0.0, vertices_[from].quadric.at(p) + vertices_[to].quadric.at(p));
   const double sum = planes + kLengthWeight * square(p - vertices_[from].position);
-  return std::isfinite(sum) ? static_cast<float>(sum) : kNowhere.cost;
+  return sum < std::numeric_limits<float>::max() ? static_cast<float>(sum) : kNowhere.cost;
 }
 
 void EdgeCollapse::push(std::uint32_t from, Target target) {
