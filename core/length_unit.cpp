@@ -80,6 +80,12 @@ std::string unit_name(std::string_view unit) {
   return known == nullptr ? std::string() : std::string(known->name);
 }
 
+std::string no_unit_text(std::string_view text) {
+  std::string message("'");
+  message.append(text).append("' is no unit of length; it is one of ").append(unit_names());
+  return message;
+}
+
 std::string unit_names() {
   std::string names;
   std::string_view last;

@@ -15,6 +15,9 @@ std::string unit_name(std::string_view unit);
 /// All names, for messages: "meter, decimeter, …".
 std::string unit_names();
 
+/// Why a text is no unit of length, with the names that are.
+std::string no_unit_text(std::string_view text);
+
 /// How many of `other` are one of `unit`, both as unit_name() has them; nothing
 /// where that is not known.
 std::optional<double> unit_ratio(std::string_view unit, std::string_view other);

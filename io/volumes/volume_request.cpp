@@ -34,9 +34,7 @@ void check_geometry(const VolumeInfo& info) {
 
 std::string checked_unit(const std::string& unit) {
   std::string name = unit_name(unit);
-  if (name.empty())
-    throw UsageError(
-        fmt::format("--unit: '{}' is no unit of length; it is one of {}", unit, unit_names()));
+  if (name.empty()) throw UsageError("--unit: " + no_unit_text(unit));
   return name;
 }
 
