@@ -207,7 +207,7 @@ int run_extract(const ExtractArguments& given, Console& console) {
   const OpenedVolume input =
       open_input(arguments.input, arguments.memory, arguments.threads, console);
   const StoreReader& store = input.store();
-  check_mesh_unit(arguments, store, console);
+  choose_mesh_unit(arguments, store, console);
   const std::vector<ExtractedSurface> surfaces = plan_surfaces(arguments, store, console);
   for (const ExtractedSurface& surface : surfaces)
     note_band(surface.options.isovalue, store.info(), console);

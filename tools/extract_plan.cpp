@@ -247,15 +247,18 @@ ExtractArguments with_preset(ExtractArguments arguments) {
   return arguments;
 }
 
-void check_mesh_unit(ExtractArguments& arguments, const StoreReader& store, Console& console) {
+void choose_mesh_unit(ExtractArguments& arguments, const StoreReader& store, Console& console) {
   std::string& unit = arguments.filters.unit;
-  if (unit.empty() || !store.info().levels.front().transform.unit.empty()) return;
-  if (!arguments.for_print)
+  const bool is_known = !store.info().levels.front().transform.unit.empty();
+  if (!unit.empty() && !is_known)
     throw UsageError(
         "--mesh-unit: the volume does not say its unit of length; convert it with --unit");
-  console.note(
-      "the volume does not say its unit of length, so the mesh is as if it were millimetres");
-  unit.clear();
+  if (!arguments.for_print || !unit.empty()) return;
+  if (is_known)
+    unit = "millimeter";
+  else
+    console.note(
+        "the volume does not say its unit of length, so the mesh is as if it were millimetres");
 }
 
 void check_arguments(const ExtractArguments& arguments) {

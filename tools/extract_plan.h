@@ -47,12 +47,12 @@ struct ExtractArguments {
   std::size_t outputs() const { return std::size_t{writes_mesh()} + !preview.path.empty(); }
 };
 
-/// What a preset adds to arguments that are not given.
+/// What a preset adds to arguments that are not given; the unit: choose_mesh_unit().
 ExtractArguments with_preset(ExtractArguments arguments);
 
-/// Takes the unit of the mesh from a preset back where the volume's unit is not known, and says so.
-/// Throws UsageError where it was requested.
-void check_mesh_unit(ExtractArguments& arguments, const StoreReader& store, Console& console);
+/// Millimetres for a print, unless another unit was requested; a note where the volume's unit is
+/// not known. Throws UsageError where a unit was requested that cannot be had.
+void choose_mesh_unit(ExtractArguments& arguments, const StoreReader& store, Console& console);
 
 /// Throws UsageError for arguments that contradict each other, before anything is opened.
 void check_arguments(const ExtractArguments& arguments);

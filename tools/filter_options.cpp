@@ -36,8 +36,7 @@ double parse_length(const std::string& text) {
 
 std::string parse_unit(const std::string& text) {
   std::string name = unit_name(text);
-  if (name.empty())
-    throw UsageError(fmt::format("'{}' is no unit of length; it is one of {}", text, unit_names()));
+  if (name.empty()) throw UsageError(no_unit_text(text));
   return name;
 }
 
@@ -80,7 +79,6 @@ void set_for_print(FilterArguments& filters) {
   if (filters.min_component == 0 && filters.largest == 0) filters.largest = 1;
   if (filters.smooth == 0) filters.smooth = kIterations;
   if (!filter_options(filters).simplifies()) filters.simplify_triangles = kTriangles;
-  if (filters.unit.empty()) filters.unit = "millimeter";
 }
 
 void check_filters(const FilterArguments& filters, bool estimates) {

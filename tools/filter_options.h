@@ -24,7 +24,7 @@ struct FilterArguments {
 void add_filters(CLI::App* app, FilterArguments& filters);
 
 /// Sets what a 3-D print needs, where it is not given: the largest component, smooth and of 500,000
-/// triangles, in millimetres.
+/// triangles.
 void set_for_print(FilterArguments& filters);
 
 /// Throws UsageError for options that contradict each other; `estimates`: nothing is written.
