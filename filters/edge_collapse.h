@@ -36,7 +36,7 @@ struct Collapse {
 class EdgeCollapse {
  public:
   /// No vertex of the group, nor the centre of a triangle, ends farther than `max_distance` from
-  /// the surface: world units; infinite: anywhere. The group must outlive it.
+  /// the surface: world units; infinite: anywhere.
   EdgeCollapse(const TriangleGroup& group, double max_distance);
 
   /// Collapses edges until `least` triangles or fewer are left, or no edge can be collapsed. To be

@@ -94,8 +94,7 @@ void check_filters(const MeshFilterOptions& options) {
     throw UsageError(
         fmt::format("the error of a simplification must be a length, not {}", options.max_error));
   if (!options.unit.empty() && unit_name(options.unit) != options.unit)
-    throw UsageError(
-        fmt::format("'{}' is no unit of length; it is one of {}", options.unit, unit_names()));
+    throw UsageError(no_unit_text(options.unit));
 }
 
 std::uint64_t filter_scratch_bytes(const MeshFilterOptions& options, MeshSize mesh,
@@ -106,7 +105,7 @@ std::uint64_t filter_scratch_bytes(const MeshFilterOptions& options, MeshSize me
   // Two filters have the mesh at the same time while one passes it on.
   if (chooses_components(options)) bytes += v * (row + 16) + triangles;
   if (options.smooth > 0) bytes += v * (row + 20) + triangles;
-  if (options.simplifies()) bytes += v * (row + 4 + 12) + 2 * triangles;
+  if (options.simplifies()) bytes += v * (row + 4 + sizeof(Collapse)) + 2 * triangles;
   if (options.measure) bytes += v * (sizeof(Vec3f) + 4);
   return bytes;
 }

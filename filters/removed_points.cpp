@@ -51,7 +51,8 @@ bool RemovedPoints::find_nearest(std::uint32_t triangle, std::span<const Patch> 
 bool RemovedPoints::permits(Vec3d vertex, std::span<const Patch> patches,
                             std::span<const std::uint32_t> gone) {
   moves_.clear();
-  if (nearest(vertex, patches) == kNone) return false;
+  vertex_to_ = nearest(vertex, patches);
+  if (vertex_to_ == kNone) return false;
   for (const Patch& patch : patches)
     if (!find_nearest(patch.triangle, patches)) return false;
   for (const std::uint32_t triangle : gone)
@@ -67,7 +68,7 @@ void RemovedPoints::move(Vec3d vertex, std::span<const Patch> patches,
     points_[i].next = first_[to];
     first_[to] = i;
   }
-  add(vertex, nearest(vertex, patches));
+  add(vertex, vertex_to_);
 }
 
 }  // namespace isobrick

@@ -52,6 +52,7 @@ class RemovedPoints {
   std::vector<Point> points_;
   std::vector<std::uint32_t> first_;  ///< of each triangle's points
   double max_square_;
+  std::uint32_t vertex_to_ = kNone;  ///< the triangle that the vertex goes to
   /// Points and the triangles that they go to.
   std::vector<std::pair<std::uint32_t, std::uint32_t>> moves_;
 };
