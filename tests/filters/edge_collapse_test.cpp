@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <random>
 #include <set>
 
 #include "filters/collapse_spool.h"
@@ -130,6 +131,28 @@ TEST(EdgeCollapse, NoSideBetweenBordersIsNew) {
         EXPECT_TRUE(before.contains({a, b}) || before.contains({b, a})) << a << ' ' << b;
       }
     }
+}
+
+// Another group may have the other side of the triangle that would be left.
+TEST(EdgeCollapse, TheLastVertexWithinATriangleStays) {
+  const TriangleGroup group = group_of({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0.3f, 0.3f, 0}},
+                                       {{0, 1, 3}, {1, 2, 3}, {2, 0, 3}});
+  EXPECT_EQ(simplified(group, 0), group.triangles);
+}
+
+// In the plane the area grows with what is turned over.
+TEST(EdgeCollapse, NoTriangleTurnsOver) {
+  std::mt19937 random(3);
+  for (int round = 0; round < 5; ++round) {
+    TriangleGroup group = sheet(24);
+    for (Vec3f& p : group.positions)
+      if (p.x > 0 && p.x < 24 && p.y > 0 && p.y < 24) {
+        p.x += static_cast<float>(random() % 1000) / 2500 - 0.2f;
+        p.y += static_cast<float>(random() % 1000) / 2500 - 0.2f;
+      }
+    for (const std::size_t least : {600u, 200u, 0u})
+      EXPECT_NEAR(measure(mesh_of(group, simplified(group, least))).area, 24 * 24, 1e-3) << least;
+  }
 }
 
 TEST(EdgeCollapse, ErrorsAscendAndAreDistances) {
