@@ -49,6 +49,12 @@ class FlatMap {
     }
     return {entries_[place].value, added};
   }
+  /// Calls f(key, value) for every key, in no order.
+  template <class F>
+  void for_each(F&& f) const {
+    for (const Entry& entry : entries_)
+      if (entry.key != kFree) f(entry.key, entry.value);
+  }
   /// The key is there.
   void erase(const Key& key) {
     std::size_t hole = place_of(key);

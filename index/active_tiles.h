@@ -5,9 +5,27 @@
 
 #include <isobrick/inside.h>
 #include <isobrick/range.h>
+#include "core/morton.h"
 #include "core/tile.h"
 
 namespace isobrick::inline v0 {
+
+/// Appends the tiles with a block of the box `blocks` for which is_active(block) holds, in Morton
+/// order. The box's low corner lies on a tile.
+template <class IsActive>
+void append_tiles_where(Box3 blocks, const IsActive& is_active, std::vector<TileWork>& tiles) {
+  constexpr Index edge = kTileEdge / kBlockEdge;
+  const Int3 first_tile{blocks.lo.x / edge, blocks.lo.y / edge, blocks.lo.z / edge};
+  for_each_morton(ceil_div(blocks.extent(), {edge, edge, edge}), [&](Int3 t) {
+    TileWork work{first_tile + t, 0};
+    for (int i = 0; i < 8; ++i) {
+      const Int3 block = work.tile * edge + Int3{i & 1, i >> 1 & 1, i >> 2};
+      if (blocks.contains(block) && is_active(block))
+        work.active_blocks |= static_cast<std::uint8_t>(1 << i);
+    }
+    if (work.active_blocks) tiles.push_back(work);
+  });
+}
 
 /// Appends the tiles with an active block, in Morton order, found by a linear
 /// scan. `blocks` is a box of 16³ blocks whose low corner lies on a tile;

@@ -22,12 +22,7 @@ class RangeSearch final : public BlockSearch {
 
   /// The ranges of a chunk's blocks.
   RangeTable read(Int3 chunk) {
-    const Lattice& lattice = store_.info().levels[static_cast<std::size_t>(level_)].lattice;
-    constexpr Int3 edge{StoreReader::kRangeChunk, StoreReader::kRangeChunk,
-                        StoreReader::kRangeChunk};
-    RangeTable table = store_.block_ranges(
-        level_,
-        intersect({chunk * edge, (chunk + Int3{1, 1, 1}) * edge}, {{0, 0, 0}, lattice.blocks()}));
+    RangeTable table = read_chunk_ranges(store_, level_, chunk);
     bytes_read_ += table.bytes_read;
     return table;
   }
@@ -73,6 +68,13 @@ class SparseSearch final : public BlockSearch {
 };
 
 }  // namespace
+
+RangeTable read_chunk_ranges(const StoreReader& store, int level, Int3 chunk) {
+  const Lattice& lattice = store.info().levels[static_cast<std::size_t>(level)].lattice;
+  constexpr Int3 edge{StoreReader::kRangeChunk, StoreReader::kRangeChunk, StoreReader::kRangeChunk};
+  return store.block_ranges(level, intersect({chunk * edge, (chunk + Int3{1, 1, 1}) * edge},
+                                             {{0, 0, 0}, lattice.blocks()}));
+}
 
 std::unique_ptr<BlockSearch> make_block_search(const StoreReader& store, int level, SearchMethod by,
                                                const std::optional<CapSearch>& cap) {

@@ -37,6 +37,9 @@ class BlockSearch {
   virtual std::uint64_t index_bytes() const { return 0; }
 };
 
+/// The ranges of a range chunk's blocks.
+RangeTable read_chunk_ranges(const StoreReader& store, int level, Int3 chunk);
+
 /// All of them give the same surface. An index works in parallel in the caller's
 /// TBB arena, in no more than block_search_bytes(). With `cap` also the blocks that capped surfaces
 /// need, which only ranges find.

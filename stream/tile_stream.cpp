@@ -35,6 +35,15 @@ TileStream::TileStream(const StoreReader& store, int level, std::vector<double> 
   const Int3 cells_end = max(samples.hi - Int3{1, 1, 1}, samples.lo);
   roi_tiles_ = {{samples.lo.x / kTileEdge, samples.lo.y / kTileEdge, samples.lo.z / kTileEdge},
                 ceil_div(cells_end, {kTileEdge, kTileEdge, kTileEdge})};
+  list_chunks(lattice);
+}
+
+TileStream::TileStream(std::unique_ptr<BlockSearch> search, const Lattice& lattice, Box3 tiles)
+    : search_(std::move(search)), isovalues_(1), roi_tiles_(tiles), tiles_of_(1) {
+  list_chunks(lattice);
+}
+
+void TileStream::list_chunks(const Lattice& lattice) {
   const Int3 chunk{kChunkTiles, kChunkTiles, kChunkTiles};
   for_each_morton(ceil_div(lattice.tiles(), chunk), [&](Int3 c) {
     if (!intersect({c * chunk, (c + Int3{1, 1, 1}) * chunk}, roi_tiles_).empty())

@@ -23,6 +23,9 @@ class TileStream {
              SearchMethod by = {}, const std::optional<CapSearch>& cap = {});
   TileStream(const StoreReader& store, int level, double isovalue, Box3 roi, SearchMethod by = {})
       : TileStream(store, level, std::vector<double>{isovalue}, roi, by) {}
+  /// The tiles of a box of tiles of `lattice` that `search` finds, as if they were active at one
+  /// isovalue.
+  TileStream(std::unique_ptr<BlockSearch> search, const Lattice& lattice, Box3 tiles);
   /// These tiles, as if they were active at one isovalue.
   explicit TileStream(std::vector<TileWork> tiles);
 
@@ -43,6 +46,7 @@ class TileStream {
   double seconds() const { return seconds_; }
 
  private:
+  void list_chunks(const Lattice& lattice);
   bool load_next_chunk();
   void merge();
 

@@ -2,7 +2,7 @@
 
 #include <tbb/parallel_invoke.h>
 
-#include "pipeline/convert/in_order.h"
+#include "pipeline/in_order.h"
 
 namespace isobrick::inline v0 {
 LevelWriter::LevelWriter(StoreWriter& store, const StoreLayout& layout, int level,

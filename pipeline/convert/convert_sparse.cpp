@@ -16,7 +16,7 @@
 #include "io/bytes/output_file.h"
 #include "pipeline/convert/brick_output.h"
 #include "pipeline/convert/downsample.h"
-#include "pipeline/convert/in_order.h"
+#include "pipeline/in_order.h"
 #include "pipeline/program_memory.h"
 
 namespace isobrick::inline v0 {

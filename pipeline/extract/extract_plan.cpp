@@ -63,10 +63,7 @@ constexpr std::uint64_t kBytesOfListedTile = 3 * sizeof(TileWork);
 
 /// What every extraction takes besides its surface and its bricks.
 std::uint64_t fixed_bytes(const ExtractRequest& request) {
-  const Lattice& lattice = request.level->lattice;
-  return kProgramBytes + kRanges + request.level->index_bytes + BrickSlots::bytes(lattice) +
-         static_cast<std::uint64_t>(request.threads) * (kDecoder + lattice.brick_bytes()) +
-         request.search_memory;
+  return reading_bytes(*request.level, request.threads) + request.search_memory;
 }
 
 [[noreturn]] void refuse_budget(const ExtractRequest& request, std::uint64_t budget,
@@ -162,6 +159,11 @@ Index reach_of(PassRequests requests) {
   for (const ExtractRequest& request : requests)
     reach = std::max(reach, sample_reach(request.surface));
   return reach;
+}
+
+std::uint64_t reading_bytes(const LevelInfo& level, int threads) {
+  return kProgramBytes + kRanges + level.index_bytes + BrickSlots::bytes(level.lattice) +
+         static_cast<std::uint64_t>(threads) * (kDecoder + level.lattice.brick_bytes());
 }
 
 std::uint64_t least_memory(PassRequests requests, std::uint64_t other_bytes) {

@@ -51,6 +51,10 @@ std::vector<double> isovalues_of(PassRequests requests);
 /// Layers of samples around a tile that any of the surfaces needs.
 Index reach_of(PassRequests requests);
 
+/// What the program takes, and reading bricks of a level on so many threads, beside the bricks
+/// themselves.
+std::uint64_t reading_bytes(const LevelInfo& level, int threads);
+
 /// The least budget that plan_memory() takes.
 std::uint64_t least_memory(PassRequests requests, std::uint64_t other_bytes);
 

@@ -10,19 +10,8 @@
 namespace isobrick::inline v0 {
 namespace {
 
-/// World-space bounds of the samples from `first` to `last`.
-MeshBounds world_bounds(const Transform& transform, Int3 first, Int3 last) {
-  MeshBounds bounds;
-  for (int corner = 0; corner < 8; ++corner) {
-    const Vec3d p = transform.apply({static_cast<double>(corner & 1 ? last.x : first.x),
-                                     static_cast<double>(corner & 2 ? last.y : first.y),
-                                     static_cast<double>(corner & 4 ? last.z : first.z)});
-    for (int axis = 0; axis < 3; ++axis) {
-      bounds.lo[axis] = corner ? std::fmin(bounds.lo[axis], p[axis]) : p[axis];
-      bounds.hi[axis] = corner ? std::fmax(bounds.hi[axis], p[axis]) : p[axis];
-    }
-  }
-  return bounds;
+Vec3d as_point(Int3 p) {
+  return {static_cast<double>(p.x), static_cast<double>(p.y), static_cast<double>(p.z)};
 }
 
 /// Empty where the coordinates of a mesh fit 32 bits; else what is wrong.
@@ -44,6 +33,19 @@ std::string misfit(const Transform& transform, Int3 extent, const std::string& n
 
 }  // namespace
 
+MeshBounds world_bounds(const Transform& transform, Vec3d first, Vec3d last) {
+  MeshBounds bounds;
+  for (int corner = 0; corner < 8; ++corner) {
+    const Vec3d p = transform.apply({corner & 1 ? last.x : first.x, corner & 2 ? last.y : first.y,
+                                     corner & 4 ? last.z : first.z});
+    for (int axis = 0; axis < 3; ++axis) {
+      bounds.lo[axis] = corner ? std::fmin(bounds.lo[axis], p[axis]) : p[axis];
+      bounds.hi[axis] = corner ? std::fmax(bounds.hi[axis], p[axis]) : p[axis];
+    }
+  }
+  return bounds;
+}
+
 void check_coordinates(const Transform& transform, Int3 extent, const std::string& name) {
   const std::string wrong = misfit(transform, extent, name);
   if (!wrong.empty()) throw Error(wrong + "; convert it with another --spacing, --origin or unit");
@@ -63,11 +65,12 @@ void check_roi(Box3 roi, Int3 extent) {
 }
 
 MeshHeader mesh_header(const Transform& transform, Int3 extent, bool normals, Box3 active) {
-  const MeshBounds all = world_bounds(transform, {0, 0, 0}, extent - Int3{1, 1, 1});
+  const MeshBounds all = world_bounds(transform, {0, 0, 0}, as_point(extent - Int3{1, 1, 1}));
   MeshHeader header{normals, all.lo, all.hi};
   header.unit = unit_name(transform.unit);
   // The last cells end at the samples behind them.
-  if (!active.empty()) header.surface = world_bounds(transform, active.lo, active.hi);
+  if (!active.empty())
+    header.surface = world_bounds(transform, as_point(active.lo), as_point(active.hi));
   return header;
 }
 

@@ -16,6 +16,9 @@ void check_transform(const Transform& transform, Int3 extent, const std::string&
 /// Throws UsageError for a region that is empty or leaves the samples of `extent`.
 void check_roi(Box3 roi, Int3 extent);
 
+/// World-space bounds of a box of index space.
+MeshBounds world_bounds(const Transform& transform, Vec3d first, Vec3d last);
+
 /// What is known of a mesh of a volume before its first chunk. `active` are the cells of its active
 /// blocks, in the region; an empty box where they are not known.
 MeshHeader mesh_header(const Transform& transform, Int3 extent, bool normals, Box3 active);

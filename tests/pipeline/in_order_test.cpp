@@ -1,4 +1,4 @@
-#include "pipeline/convert/in_order.h"
+#include "pipeline/in_order.h"
 
 #include <gtest/gtest.h>
 

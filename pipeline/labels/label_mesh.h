@@ -1,0 +1,36 @@
+#pragma once
+
+#include <mutex>
+#include <stop_token>
+
+#include <isobrick/labels.h>
+#include <isobrick/transform.h>
+#include "pipeline/labels/label_spool.h"
+
+namespace isobrick::inline v0 {
+
+/// The mesh of a label whose pieces wait in a spool.
+class SpooledLabelMesh final : public LabelMesh {
+ public:
+  /// All but `chain` must outlive it. `header` is what sinks hear before the first chunk.
+  SpooledLabelMesh(const LabelSpool& spool, const LabelChain& chain, const Transform& transform,
+                   MeshHeader header, std::stop_token cancel)
+      : spool_(spool),
+        chain_(chain),
+        transform_(transform),
+        header_(std::move(header)),
+        cancel_(std::move(cancel)) {}
+
+  std::int64_t label() const override { return chain_.label; }
+  MeshSize size() const override { return {chain_.vertices, 2 * chain_.quads}; }
+  void write(MeshSink& sink) const override;
+
+ private:
+  const LabelSpool& spool_;
+  LabelChain chain_;
+  const Transform& transform_;
+  MeshHeader header_;
+  std::stop_token cancel_;
+};
+
+}  // namespace isobrick
