@@ -11,6 +11,7 @@
 #include "bricks/level_set.h"
 #include "bricks/zarr/metadata_files.h"
 #include "io/bytes/output_guard.h"
+#include "tools/extract_labels.h"
 #include "tools/extract_plan.h"
 #include "tools/output_name.h"
 #include "tools/value_range.h"
@@ -198,6 +199,7 @@ void note_band(double isovalue, const StoreInfo& info, Console& console) {
 }
 
 int run_extract(const ExtractArguments& given, Console& console) {
+  if (given.labels) return run_extract_labels(given, console);
   ExtractArguments arguments = with_preset(given);
   check_arguments(arguments);
   const bool streams =
@@ -294,6 +296,12 @@ void add_extract(Program& program) {
                      "  isobrick extract head.zarr --isovalue otsu   # writes head_487.5.ply");
   add_input(app, arguments->input);
   add_isovalues(app, arguments->isovalues, "Value that the surface passes through");
+  add_parsed(
+      app, arguments->labels,
+      [](const std::string& text) { return std::optional(parse_labels(text)); },
+      {"--labels", "all|ID,A:B",
+       "In place of isosurfaces, a closed mesh of each label of a segmentation, in the folder -o: "
+       "of all but 0, or of these, such as 3,7,10:20"});
   add_outputs(app, *arguments);
   add_level_options(app, *arguments);
   add_region(app, arguments->region);

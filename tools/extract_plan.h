@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include <isobrick/labels.h>
 #include <isobrick/store_reader.h>
 #include "tools/extract_report.h"
 #include "tools/filter_options.h"
@@ -18,6 +19,7 @@ namespace isobrick::tools {
 struct ExtractArguments {
   InputArguments input;
   std::vector<IsovalueRequest> isovalues;
+  std::optional<std::vector<LabelRange>> labels;  ///< in place of isovalues; none: all of them
   std::string output;  ///< empty: by the input's name, unless nothing is to be written
   PreviewRequest preview;
   std::optional<MeshFormat> format;  ///< of the output; nothing: by its name

@@ -30,7 +30,7 @@ struct SynthArguments {
 SynthKind parse_kind(const std::string& text) {
   if (const auto kind = parse_synth_kind(text)) return *kind;
   throw UsageError(fmt::format(
-      "unknown kind '{}'; the kinds are sphere, gyroid, marschner-lobb and mixing", text));
+      "unknown kind '{}'; the kinds are sphere, gyroid, marschner-lobb, mixing and cells", text));
 }
 
 /// Computes `box` into `out`, a few rows a task.
@@ -124,7 +124,9 @@ void add_synth(Program& program) {
   CLI::App* app = add_subcommand(program, "synth",
                                  "Make a procedural volume of any size, the same on every machine.",
                                  "isobrick synth gyroid gyroid.zarr --dims 256,256,256 --type u8");
-  add_text(app, {"KIND", "sphere|gyroid|marschner-lobb|mixing", "Which field", "", true},
+  add_text(app,
+           {"KIND", "sphere|gyroid|marschner-lobb|mixing|cells",
+            "Which field; cells is a label image", "", true},
            [&kind = arguments->synth.kind](const std::string& text) { kind = parse_kind(text); });
   add_output_or_positional(app, arguments->out, "ZARR",
                            "Store to write, or a raw file if it ends in .raw",
@@ -134,8 +136,8 @@ void add_synth(Program& program) {
   add_parsed(app, arguments->synth.seed, parse_offset,
              {"--seed", "N", "Of the random numbers", "1"});
   add_parsed(app, arguments->synth.frequency, parse_number,
-             {"--frequency", "F", "Periods or largest eddies along the longest edge",
-              "2 of gyroid, 6 of mixing"});
+             {"--frequency", "F", "Periods, largest eddies or cells along the longest edge",
+              "2 of gyroid, 6 of mixing, 5 of cells"});
   add_parsed(app, arguments->synth.noise, parse_number,
              {"--noise", "A", "Amplitude of the gyroid's noise, as a part of the field's", "0.01"});
   add_store_options(app, arguments->store);

@@ -26,10 +26,16 @@ struct LabelOptions {
   std::vector<LabelRange> labels = {};  ///< none: all but `background`
   std::int64_t background = 0;          ///< no object, unless `labels` names it
   int level = 0;                        ///< 0: the finest
-  std::optional<Box3> roi = {};         ///< samples of that level; nothing: the whole volume
-  /// Hard budget, bytes, beside what the sinks of the meshes hold.
+  /// Iterations of Taubin's λ|μ smoothing, at most 6. All meshes are smoothed together, so walls
+  /// still coincide, and no vertex leaves its cell.
+  int smooth = 0;
+  double pass_band = 0.1;        ///< of the smoothing, see MeshFilterOptions
+  std::optional<Box3> roi = {};  ///< samples of that level; nothing: the whole volume
+  /// Hard budget of the pass, bytes. Meshes are passed on after it; then a quarter is still taken
+  /// at most.
   std::uint64_t memory = std::uint64_t{1} << 30;
   int threads = 0;  ///< 0: all cores
+  int visits = 0;   ///< meshes that are passed on at the same time; 0: as many as threads
   /// The file or folder beside which the scratch file lies; "-": in the folder of temporary files.
   std::filesystem::path scratch_beside = "-";
   /// Ends the operation with Cancelled, soon after a stop is requested on any thread.
@@ -43,7 +49,7 @@ class ISOBRICK_API LabelMesh {
 
   virtual std::int64_t label() const = 0;  ///< the samples' value
   virtual MeshSize size() const = 0;       ///< vertices and triangles
-  /// Passes the mesh to a sink of welded chunks (begin … finish), each time the same.
+  /// Passes the mesh to a sink (begin … finish), each time the same.
   virtual void write(MeshSink& sink) const = 0;
 };
 

@@ -16,9 +16,10 @@ enum class SynthKind : std::uint8_t {
   gyroid,          ///< the triply periodic surface, with white noise on top
   marschner_lobb,  ///< the test signal of Marschner and Lobb (f_M = 6, α = ¼)
   mixing,          ///< two fluids, layered along z, that mix in turbulence at mid-height
+  cells,           ///< a label image: cells with gaps between them, numbered from 1
 };
 
-/// Its name on the command line: "sphere", "gyroid", "marschner-lobb", "mixing".
+/// Its name on the command line: "sphere", "gyroid", "marschner-lobb", "mixing", "cells".
 ISOBRICK_API std::string_view name_of(SynthKind kind);
 /// The kind of this name; nullopt for any other.
 ISOBRICK_API std::optional<SynthKind> parse_synth_kind(std::string_view name);
@@ -31,14 +32,14 @@ struct SynthOptions {
   std::uint64_t seed = 1;              ///< of all that is random
   /// gyroid: periods along the longest edge; of N cells along that edge about
   /// 4.6 · frequency / N are active (2 at 512³: 1.8 %).
-  /// mixing: largest eddies along the longest edge. Nothing: 2 and 6.
+  /// mixing: largest eddies along the longest edge. cells: cells along it. Nothing: 2, 6 and 5.
   std::optional<double> frequency = {};
   /// gyroid: amplitude of the noise, as a part of the field's.
   double noise = 0.01;
 };
 
 /// The isovalue in the middle of every kind's field, where all of them have an
-/// obvious surface. A field in [−1, 1] fills the type: floating samples are the
+/// obvious surface, but cells. A field in [−1, 1] fills the type: floating samples are the
 /// field itself (isovalue 0); unsigned ones reach from 0 to their maximum
 /// (127.5 for u8), signed ones from their minimum to their maximum (−0.5). The
 /// isovalue lies between two integers, so that no sample equals it.

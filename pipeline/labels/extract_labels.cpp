@@ -21,6 +21,7 @@
 #include "pipeline/workers.h"
 #include "stream/batch_lookahead.h"
 #include "stream/brick_cache.h"
+#include "surface/labels/label_tile.h"
 
 namespace isobrick::inline v0 {
 namespace {
@@ -55,6 +56,7 @@ class LabelExtraction {
         progress_(progress, options.cancel) {
     check_coordinates(level_.transform, level_.lattice.extent, "'" + store.info().name + "'");
     check_roi(roi_, level_.lattice.extent);
+    smoothing_ = label_smoothing(options);
     plan_ = plan_label_memory(store, options);
   }
 
@@ -71,7 +73,7 @@ class LabelExtraction {
       const std::vector<LabelChain> chains = spool.finish();
       check_named(chains);
       const Stopwatch write_watch(report_.write_seconds);
-      pass_on(spool, chains, visit);
+      workers.execute([&] { pass_on(spool, chains, visit); });
     }
     return report_;
   }
@@ -86,6 +88,7 @@ class LabelExtraction {
             {floor_div(lo, edge), ceil_div(roi_.hi, edge)}};
   }
 
+  Index reach() const { return LabelTile::sample_reach(smoothing_); }
   std::uint64_t tile_bytes() const { return kTileVolume * level_.lattice.sample_bytes(); }
 
   /// Makes the pieces of all tiles.
@@ -94,11 +97,10 @@ class LabelExtraction {
     for (TileStream counted = tiles(); counted.next();) ++count;
     progress_.begin("extracting labels", count * tile_bytes());
     TileStream stream = tiles();
-    BatchPlanner planner(stream, level_.lattice, LabelWindow::kBefore, true, kBatchTiles,
-                         plan_.batch_bricks);
+    BatchPlanner planner(stream, level_.lattice, reach(), true, kBatchTiles, plan_.batch_bricks);
     const BrickReader reader(store_, options_.level);
     BatchLookahead batches(planner, reader);
-    BrickCache cache(store_, options_.level, LabelWindow::kBefore, plan_.cache_bricks);
+    BrickCache cache(store_, options_.level, reach(), plan_.cache_bricks);
     const bool room_for_two = plan_.cache_bricks >= 2 * plan_.batch_bricks;
     const auto begin = [&](const TileBatch& batch) {
       return cache.begin(batch.bricks, batch.tiles.back().tile);
@@ -141,7 +143,7 @@ class LabelExtraction {
 
   void make_tile(const TileSamples& samples, TileJob& job) {
     std::unique_ptr<LabelTile> tile;
-    if (!free_tiles_.try_pop(tile)) tile = std::make_unique<LabelTile>();
+    if (!free_tiles_.try_pop(tile)) tile = std::make_unique<LabelTile>(smoothing_);
     job.packed = LabelSpool::pack(
         tile->make(samples, level_.lattice.type, job.tile, roi_,
                    [this](std::int64_t label) { return labels_.contains(label); }));
@@ -165,7 +167,7 @@ class LabelExtraction {
           [](const LabelChain& chain, std::int64_t label) { return chain.label < label; });
       if (at == chains.end() || at->label != range.first)
         throw UsageError(fmt::format("'{}' has no label {}{}", store_.info().name, range.first,
-                                     options_.roi ? " in the region" : ""));
+                                     roi_ != level_.lattice.box() ? " in the region" : ""));
     }
   }
 
@@ -190,6 +192,7 @@ class LabelExtraction {
   /// Passes the meshes on.
   void pass_on(const LabelSpool& spool, const std::vector<LabelChain>& chains,
                const LabelVisitor& visit) {
+    free_tiles_.clear();
     for (const LabelChain& chain : chains) {
       ++report_.labels;
       report_.vertices += chain.vertices;
@@ -217,6 +220,7 @@ class LabelExtraction {
   Box3 roi_;
   LabelSelection labels_;
   CancellableProgress progress_;
+  LabelSmoothing smoothing_;
   LabelPlan plan_;
   tbb::concurrent_queue<std::unique_ptr<LabelTile>> free_tiles_;
   LabelReport report_;

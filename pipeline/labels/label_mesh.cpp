@@ -15,35 +15,43 @@
 namespace isobrick::inline v0 {
 namespace {
 
-/// Numbers of the vertices that tiles below may name: those in a tile's first planes of cells.
+/// A vertex that a tile owns: its place in the mesh.
+struct PlacedVertex {
+  std::uint32_t number = 0;
+  Vec3f position;
+};
+
+/// The vertices that tiles below may name: those in a tile's first planes of cells.
 ///
 /// Tiles come from the last to the first in Morton order, so a tile's upper neighbours are there
 /// when it comes. They are forgotten when all their lower neighbours had their turn.
 class Frontier {
  public:
-  /// A tile whose vertices are numbered from `first` on.
-  void add(const SpooledPiece& piece, std::uint32_t first) {
+  /// A tile whose vertices, at `positions`, are numbered from `first` on.
+  void add(const SpooledPiece& piece, std::uint32_t first, std::span<const Vec3f> positions) {
     std::vector<Named>& named = vertices_of_[morton_encode(piece.tile)];
-    int last_cell = -1;
-    for (std::size_t i = 0; i < piece.vertices.size(); ++i) {
-      const int cell = cell_of(piece.vertices[i]);
+    std::uint32_t last_cell = ~std::uint32_t{0};
+    for (std::size_t i = 0; i < positions.size(); ++i) {
+      const std::uint32_t cell = piece.vertices[i].cell;
       if (cell != last_cell && is_in_first_plane(cell))
-        named.push_back({cell, first + static_cast<std::uint32_t>(i)});
+        named.push_back({cell, {first + static_cast<std::uint32_t>(i), positions[i]}});
       last_cell = cell;
     }
     const Int3 lowest = max(piece.tile - Int3{1, 1, 1}, {0, 0, 0});
     until_.push({morton_encode(lowest), morton_encode(piece.tile)});
   }
 
-  /// The number of a vertex that a neighbour of `tile` owns.
-  std::uint32_t number_of(Int3 tile, ForeignVertex vertex) const {
+  /// A vertex that a neighbour of `tile` owns.
+  PlacedVertex find(Int3 tile, ForeignVertex vertex) const {
     const auto found = vertices_of_.find(morton_encode(tile + vertex.neighbour()));
     if (found == vertices_of_.end()) missing();
     const std::vector<Named>& named = found->second;
-    const auto at = std::lower_bound(named.begin(), named.end(), vertex.cell(),
-                                     [](const Named& n, int cell) { return n.cell < cell; });
+    const auto at =
+        std::lower_bound(named.begin(), named.end(), vertex.cell(),
+                         [](const Named& n, std::uint32_t cell) { return n.cell < cell; });
     if (at == named.end() || at->cell != vertex.cell()) missing();
-    return at->number + static_cast<std::uint32_t>(vertex.sheet());
+    // The sheets of a cell follow one another, all at the same place.
+    return {at->first.number + vertex.sheet(), at->first.position};
   }
 
   /// Forgets what no tile before `tile` names.
@@ -54,15 +62,14 @@ class Frontier {
   }
 
  private:
-  /// The first vertex of a cell.
   struct Named {
-    int cell;
-    std::uint32_t number;
+    std::uint32_t cell;
+    PlacedVertex first;  ///< of the cell's
   };
 
-  static bool is_in_first_plane(int cell) {
-    const auto place = LabelWindow::place(cell);
-    return std::find(place.begin(), place.end(), LabelWindow::kBefore) != place.end();
+  static bool is_in_first_plane(std::uint32_t cell) {
+    const auto place = TileCells::place(static_cast<int>(cell));
+    return std::find(place.begin(), place.end(), TileCells::kBefore) != place.end();
   }
   [[noreturn]] static void missing() {
     throw std::logic_error("a label's tile names a vertex that its neighbour does not have");
@@ -73,47 +80,80 @@ class Frontier {
   std::priority_queue<std::pair<std::uint64_t, std::uint64_t>> until_;
 };
 
-Vec3f as_position(Vec3d p) {
+Vec3f position_of(const LabelVertex& v, Int3 tile, const Transform& transform) {
+  const auto place = TileCells::place(static_cast<int>(v.cell));
+  Vec3d p;
+  for (int axis = 0; axis < 3; ++axis) {
+    const Index cell =
+        tile[axis] * kTileEdge - TileCells::kBefore + place[static_cast<std::size_t>(axis)];
+    p[axis] = static_cast<double>(cell) + static_cast<double>(v.in_cell[axis]);
+  }
+  p = transform.apply(p);
   return {static_cast<float>(p.x), static_cast<float>(p.y), static_cast<float>(p.z)};
 }
+
+/// Makes the chunks of a mesh, a tile each.
+class ChunkMaker {
+ public:
+  ChunkMaker(const Transform& transform, Indexing indexing)
+      : transform_(transform),
+        mirrored_(world_map(transform).mirrored),
+        is_welded_(indexing == Indexing::welded) {}
+
+  /// Valid until the next call.
+  MeshChunk make(const SpooledPiece& piece) {
+    const auto owned = static_cast<std::uint32_t>(piece.vertices.size());
+    positions_.clear();
+    for (const LabelVertex& v : piece.vertices)
+      positions_.push_back(position_of(v, piece.tile, transform_));
+    frontier_.add(piece, first_, positions_);
+    numbers_.clear();
+    for (std::uint32_t i = 0; i < owned; ++i) numbers_.push_back(is_welded_ ? first_ + i : i);
+    for (const ForeignVertex v : piece.foreign) {
+      const PlacedVertex vertex = frontier_.find(piece.tile, v);
+      numbers_.push_back(is_welded_ ? vertex.number
+                                    : static_cast<std::uint32_t>(positions_.size()));
+      if (!is_welded_) positions_.push_back(vertex.position);
+    }
+    triangles_.clear();
+    for (const LabelQuad& quad : piece.quads) {
+      const std::uint32_t a = numbers_[quad[0]], c = numbers_[quad[2]];
+      const std::uint32_t b = numbers_[quad[mirrored_ ? 3 : 1]],
+                          d = numbers_[quad[mirrored_ ? 1 : 3]];
+      triangles_.push_back({a, b, c});
+      triangles_.push_back({a, c, d});
+    }
+    frontier_.advance(piece.tile);
+    const std::uint32_t first = first_;
+    first_ += owned;
+    return {first, positions_, {}, triangles_};
+  }
+
+ private:
+  const Transform& transform_;
+  bool mirrored_, is_welded_;
+  Frontier frontier_;
+  std::uint32_t first_ = 0;  ///< vertices of the tiles before
+  std::vector<Vec3f> positions_;
+  std::vector<std::uint32_t> numbers_;  ///< of the owned vertices, then of the foreign ones
+  std::vector<Triangle> triangles_;
+};
 
 }  // namespace
 
 void SpooledLabelMesh::write(MeshSink& sink) const {
   if (chain_.vertices > std::numeric_limits<std::uint32_t>::max())
-    throw Error(
-        fmt::format("label {} has {} vertices, and a mesh has 2^32 - 1 at most; choose a "
-                    "coarser level or a region",
-                    chain_.label, chain_.vertices));
-  const bool mirrored = world_map(transform_).mirrored;
+    throw Error(fmt::format(
+        "label {} has {} vertices, and a mesh has 2^32 - 1 at most; choose a coarser level or a "
+        "region",
+        chain_.label, chain_.vertices));
   sink.begin(header_);
-  Frontier frontier;
+  ChunkMaker chunks(transform_, sink.indexing());
   SpooledPiece piece;
-  std::vector<Vec3f> positions;
-  std::vector<Triangle> triangles;
-  std::uint32_t first = 0;
   for (std::uint64_t place = chain_.last; place != LabelSpool::kNoPiece; place = piece.previous) {
     if (cancel_.stop_requested()) throw Cancelled("the operation was cancelled");
     spool_.read(place, piece);
-    const auto owned = static_cast<std::uint32_t>(piece.vertices.size());
-    positions.clear();
-    for (const LabelVertex v : piece.vertices)
-      positions.push_back(as_position(transform_.apply(label_point(piece.tile, v))));
-    const auto number = [&](std::uint32_t v) {
-      return v < owned ? first + v : frontier.number_of(piece.tile, piece.foreign[v - owned]);
-    };
-    triangles.clear();
-    for (const LabelQuad& quad : piece.quads) {
-      const std::uint32_t a = number(quad[0]), c = number(quad[2]);
-      std::uint32_t b = number(quad[1]), d = number(quad[3]);
-      if (mirrored) std::swap(b, d);
-      triangles.push_back({a, b, c});
-      triangles.push_back({a, c, d});
-    }
-    sink.write({first, positions, {}, triangles});
-    frontier.add(piece, first);
-    frontier.advance(piece.tile);
-    first += owned;
+    sink.write(chunks.make(piece));
   }
   sink.finish();
 }

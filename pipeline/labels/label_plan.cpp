@@ -10,6 +10,7 @@
 #include "pipeline/extract/extract_plan.h"
 #include "pipeline/labels/label_spool.h"
 #include "pipeline/program_memory.h"
+#include "surface/labels/label_tile.h"
 
 namespace isobrick::inline v0 {
 namespace {
@@ -19,14 +20,25 @@ constexpr std::uint64_t kLeastForLabels = std::uint64_t{4} << 20;
 
 }  // namespace
 
+LabelSmoothing label_smoothing(const LabelOptions& options) {
+  if (options.smooth < 0 || options.smooth > kMaxLabelSmoothing)
+    throw UsageError(fmt::format("labels are smoothed by 0 to {} iterations, not {}",
+                                 kMaxLabelSmoothing, options.smooth));
+  if (!(options.pass_band > 0 && options.pass_band <= 0.8))
+    throw UsageError(
+        fmt::format("the pass band must be above 0 and at most 0.8, not {}", options.pass_band));
+  return {options.smooth, options.pass_band};
+}
+
 LabelPlan plan_label_memory(const StoreReader& store, const LabelOptions& options) {
   const LevelInfo& level = store.info().levels[static_cast<std::size_t>(options.level)];
   const Lattice& lattice = level.lattice;
+  const LabelSmoothing smoothing = label_smoothing(options);
   LabelPlan plan;
   plan.threads = options.threads > 0 ? options.threads : tbb::info::default_concurrency();
-  const std::size_t tile_bricks = max_bricks_of_tile(lattice, LabelWindow::kBefore);
+  const std::size_t tile_bricks = max_bricks_of_tile(lattice, LabelTile::sample_reach(smoothing));
   const std::uint64_t tile_bytes =
-      LabelTile::max_bytes(lattice.type) + LabelSpool::max_packed_bytes();
+      LabelTile::max_bytes(lattice.type, smoothing) + LabelSpool::max_packed_bytes();
   const std::uint64_t fixed = reading_bytes(level, plan.threads) +
                               decode_extra(store.info(), plan.threads) + store.storage()->memory();
   const std::uint64_t least =
@@ -41,7 +53,7 @@ LabelPlan plan_label_memory(const StoreReader& store, const LabelOptions& option
   plan.label_bytes = kLeastForLabels + spare / 4;
   plan.tiles = std::clamp<std::size_t>(1 + spare / 4 / tile_bytes, 1,
                                        2 * static_cast<std::size_t>(plan.threads));
-  plan.meshes = std::min(plan.tiles, static_cast<std::size_t>(plan.threads));
+  plan.meshes = static_cast<std::size_t>(options.visits > 0 ? options.visits : plan.threads);
   const std::uint64_t bricks = static_cast<std::uint64_t>(volume(lattice.bricks()));
   plan.cache_bricks =
       std::clamp<std::uint64_t>(tile_bricks + spare / 2 / lattice.brick_bytes(), tile_bricks,

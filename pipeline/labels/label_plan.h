@@ -4,6 +4,7 @@
 #include <cstdint>
 
 #include <isobrick/labels.h>
+#include "surface/labels/label_points.h"
 
 namespace isobrick::inline v0 {
 
@@ -16,6 +17,9 @@ struct LabelPlan {
   std::uint64_t label_bytes = 0;  ///< for what is known of each label
   std::size_t meshes = 1;         ///< that are passed on at a time
 };
+
+/// How the points of labels are smoothed. Throws UsageError for what makes no sense.
+LabelSmoothing label_smoothing(const LabelOptions& options);
 
 /// Throws UsageError naming the least budget that works when this one does not.
 LabelPlan plan_label_memory(const StoreReader& store, const LabelOptions& options);

@@ -9,7 +9,7 @@
 #include <isobrick/lattice.h>
 #include "core/flat_map.h"
 #include "io/bytes/output_file.h"
-#include "surface/labels/label_tile.h"
+#include "surface/labels/label_piece.h"
 
 namespace isobrick::inline v0 {
 

@@ -520,7 +520,7 @@ def verify(
 ) -> dict[str, Any]: ...
 def export(source: Any, path: _Path, *, progress: _Progress = None, **options: Any) -> None: ...
 def synth(
-    kind: Literal["sphere", "gyroid", "marschner-lobb", "mixing"],
+    kind: Literal["sphere", "gyroid", "marschner-lobb", "mixing", "cells"],
     path: Optional[_Path] = None,
     *,
     shape: Sequence[int],

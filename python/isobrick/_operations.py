@@ -165,7 +165,7 @@ def synth(
 
     Parameters
     ----------
-    kind : "sphere", "gyroid", "marschner-lobb" or "mixing"
+    kind : "sphere", "gyroid", "marschner-lobb", "mixing" or "cells"
         The field.
     path : str or path, optional
         A store to write. None: returns an array [z, y, x].

@@ -135,7 +135,7 @@ std::unique_ptr<VolumeSource> synth_source(const std::string& kind, Int3 extent,
                                            std::uint64_t seed, std::optional<double> frequency,
                                            double noise) {
   const auto parsed = parse_synth_kind(kind);
-  if (!parsed) throw UsageError("the kinds are sphere, gyroid, marschner-lobb and mixing");
+  if (!parsed) throw UsageError("the kinds are sphere, gyroid, marschner-lobb, mixing and cells");
   return make_synth({.kind = *parsed,
                      .extent = extent,
                      .type = type,

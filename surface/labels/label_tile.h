@@ -8,6 +8,8 @@
 #include <isobrick/lattice.h>
 #include "core/flat_map.h"
 #include "core/tile.h"
+#include "surface/labels/label_piece.h"
+#include "surface/labels/label_points.h"
 #include "surface/tile_samples.h"
 
 // Surface nets of labels (Gibson 1998): the boundary of each label in a tile.
@@ -23,64 +25,33 @@
 
 namespace isobrick::inline v0 {
 
-/// A place in a tile's window of cells, x + kEdge · (y + kEdge · z).
+/// The samples and cells that the points of a tile depend on: edge³ from the window's origin on.
 struct LabelWindow {
-  /// Samples and cells along each axis. The window's first sample, and its first cell, is
-  /// kBefore before the tile's first one.
-  static constexpr int kBefore = 2;
-  static constexpr int kEdge = kTileEdge + 5;
-  static constexpr int kVolume = kEdge * kEdge * kEdge;
+  int margin;  ///< cells before the tile's first one
+  int edge;
 
-  static constexpr int at(int x, int y, int z) { return x + kEdge * (y + kEdge * z); }
-  static constexpr std::array<int, 3> place(int at) {
-    return {at % kEdge, at / kEdge % kEdge, at / (kEdge * kEdge)};
+  explicit LabelWindow(int reach)
+      : margin(TileCells::kBefore + reach), edge(TileCells::kEdge + 2 * reach) {}
+
+  int at(int x, int y, int z) const { return x + edge * (y + edge * z); }
+  std::array<int, 3> place(int cell) const {
+    return {cell % edge, cell / edge % edge, cell / (edge * edge)};
   }
+  std::array<int, 3> steps() const { return {1, edge, edge * edge}; }
+  std::size_t volume() const { return static_cast<std::size_t>(edge * edge * edge); }
   /// The window's first sample.
-  static constexpr Int3 origin(Int3 tile) {
-    return tile * kTileEdge - Int3{kBefore, kBefore, kBefore};
-  }
+  Int3 origin(Int3 tile) const { return tile * kTileEdge - Int3{margin, margin, margin}; }
 };
 
-/// A vertex that a tile owns: its cell in the window (16 bits), then which of the cell's edges have
-/// ends of different labels (12 bits).
-using LabelVertex = std::uint32_t;
-constexpr int cell_of(LabelVertex v) { return static_cast<int>(v & 0xffff); }
-constexpr int edges_of(LabelVertex v) { return static_cast<int>(v >> 16); }
-
-/// The point of a cell, in index space.
-Vec3d label_point(Int3 tile, LabelVertex v);
-
-/// A vertex that a neighbour above owns: the neighbour (3 bits, x the lowest), the cell in the
-/// neighbour's window (16 bits) and the label's sheet in it (2 bits).
-struct ForeignVertex {
-  std::uint32_t bits = 0;
-
-  Int3 neighbour() const {
-    return {static_cast<Index>(bits & 1), static_cast<Index>(bits >> 1 & 1),
-            static_cast<Index>(bits >> 2 & 1)};
-  }
-  int cell() const { return static_cast<int>(bits >> 3 & 0xffff); }
-  int sheet() const { return static_cast<int>(bits >> 19); }
-  friend bool operator==(ForeignVertex, ForeignVertex) = default;
-};
-
-/// Four vertices, counter-clockwise seen from outside the label; it is divided between the first
-/// and the third. Numbers below the count of owned vertices are theirs, the others, less that
-/// count, those of the foreign ones.
-using LabelQuad = std::array<std::uint32_t, 4>;
-
-/// What a tile has of one label.
-struct LabelPiece {
-  std::int64_t label = 0;
-  std::span<const LabelVertex> vertices;  ///< in the order of the cells, then of the sheets
-  std::span<const ForeignVertex> foreign;
-  std::span<const LabelQuad> quads;
-};
+/// Rows of a window are words.
+inline constexpr int kMaxLabelSmoothing = 6;
+static_assert(TileCells::kEdge + 4 * kMaxLabelSmoothing <= 64);
 
 /// Makes the pieces of tiles, one at a time. Reuse it: it keeps its memory.
 class LabelTile {
  public:
-  LabelTile();
+  /// At most kMaxLabelSmoothing iterations.
+  explicit LabelTile(const LabelSmoothing& smoothing = {});
 
   /// The tile's labels within `roi`. `is_chosen(label)` says which are requested; the others have
   /// no pieces, but the same places. `fill` is of absent bricks. Throws Error where a sample is no
@@ -93,12 +64,15 @@ class LabelTile {
     return make_pieces();
   }
 
+  /// Layers of samples around a tile's own 33³ that it takes.
+  static Index sample_reach(const LabelSmoothing& smoothing) {
+    return TileCells::kBefore + smoothing.reach();
+  }
   /// Bytes that one takes at most.
-  static std::uint64_t max_bytes(ScalarType type);
+  static std::uint64_t max_bytes(ScalarType type, const LabelSmoothing& smoothing);
 
  private:
   using Id = std::uint16_t;
-  static constexpr int kEdge = LabelWindow::kEdge;
   static constexpr Id kOutside = 0;  ///< of the region, and of samples without a label
 
   /// In numbers of vertices: of a foreign vertex, and of one that no quad has named yet.
@@ -128,22 +102,25 @@ class LabelTile {
   void number_labels(Box3 roi);
   Id id_of(std::int64_t label);
   void find_edges();
+  void find_points();
   void visit_cells();
-  void visit_cell(int x, int y, int z);
+  void visit_cell(int cell, const std::array<int, 3>& place);
+  int corner_at(int corner) const;
   std::uint8_t corners_with(Id id, int cell) const;
   bool is_split(Id id, std::uint8_t corners, int cell) const;
   void add_vertices(Id id, std::uint8_t corners, int cell, bool is_foreign);
-  LabelVertex vertex_in(int cell) const {
-    return static_cast<LabelVertex>(cell) |
-           static_cast<LabelVertex>(cell_edges_[static_cast<std::size_t>(cell)]) << 16;
-  }
+  std::uint32_t code_of(int cell) const;
+  ForeignVertex foreign_vertex(int cell, std::uint32_t sheet) const;
   void visit_edges();
   void visit_edge(int axis, int x, int y, int z);
   void add_quad(Id id, int axis, const std::array<int, 4>& cells, bool is_upper);
   std::uint32_t vertex_of(Id id, int cell, int edge);
+  Vec3f point_of(int cell) const;
   std::span<const LabelPiece> make_pieces();
   void sort_by_label();
 
+  LabelSmoothing smoothing_;
+  LabelWindow window_;
   Int3 tile_;
   /// Owned cells are those in [lo_, hi_) of the window.
   std::array<int, 3> lo_{}, hi_{};
@@ -154,9 +131,8 @@ class LabelTile {
   FlatMap<Id> id_of_;
   /// Bits x of each row (y, z): the sample differs from the next one along x, y and z.
   std::array<std::vector<std::uint64_t>, 3> differs_;
-  // Of each cell whose corners differ.
-  std::vector<std::uint16_t> cell_edges_;
-  std::vector<std::uint32_t> first_entry_;
+  LabelPoints points_;
+  std::vector<std::uint32_t> first_entry_;  ///< of each point's cell
   std::vector<Entry> entries_;
   std::vector<Of<LabelVertex>> owned_;
   std::vector<Of<ForeignVertex>> foreign_;

@@ -132,10 +132,8 @@ TEST_F(Labels, MeshesAreClosedManifolds) {
     }
 }
 
-TEST_F(Labels, WallsCoincide) {
-  const Field<std::uint16_t> field = cells<std::uint16_t>({50, 45, 40}, 30, 1);
-  const Meshes meshes = meshes_of_all(store(field));
-  ASSERT_EQ(meshes.count(0), 1u);
+/// Every triangle has its reverse in one other mesh, but at the volume's border.
+void expect_common_walls(const Meshes& meshes, Int3 extent) {
   std::multiset<Corners3> forward, backward;
   for (const auto& [label, mesh] : meshes)
     for (const Triangle& t : mesh.triangles) {
@@ -148,7 +146,7 @@ TEST_F(Labels, WallsCoincide) {
       bool outer = false;
       for (int axis = 0; axis < 3; ++axis) {
         const float p = c[static_cast<std::size_t>(axis)];
-        outer |= p < 0 || p > static_cast<float>(field.extent[axis] - 1);
+        outer |= p < 0 || p > static_cast<float>(extent[axis] - 1);
       }
       return outer;
     });
@@ -158,6 +156,18 @@ TEST_F(Labels, WallsCoincide) {
   }
   EXPECT_GT(at_border, 0u);
   EXPECT_LT(at_border, forward.size() / 2);
+}
+
+TEST_F(Labels, WallsCoincide) {
+  const Field<std::uint16_t> field = cells<std::uint16_t>({50, 45, 40}, 30, 1);
+  const StoreReader s = store(field);
+  for (const int smooth : {0, 1, 6}) {
+    const Meshes meshes = meshes_of_all(s, {.smooth = smooth});
+    ASSERT_EQ(meshes.count(0), 1u);
+    expect_common_walls(meshes, field.extent);
+    for (const auto& [label, mesh] : meshes)
+      EXPECT_TRUE(isobrick::testing::is_closed_manifold(mesh)) << label;
+  }
 }
 
 TEST_F(Labels, EnclosedVolumesAreThoseOfTheSamples) {
@@ -237,6 +247,43 @@ TEST_F(Labels, NothingButVolumeLevelAndRegionShows) {
   for (const auto& [label, mesh] : chosen) EXPECT_EQ(mesh, expected.at(label)) << label;
 }
 
+TEST_F(Labels, SmoothMeshesDependOnNothingElseEither) {
+  const Field<std::uint16_t> field = cells<std::uint16_t>({70, 66, 50}, 40, 4);
+  for (const int smooth : {1, 6}) {
+    const Meshes expected = meshes_of(store(field), {.smooth = smooth, .threads = 1});
+    EXPECT_EQ(meshes_of(store(field, 16), {.smooth = smooth, .threads = 3}), expected);
+    const Meshes one = meshes_of(store(field, 32), {.labels = {{7, 7}}, .smooth = smooth});
+    EXPECT_EQ(one.at(7), expected.at(7));
+  }
+}
+
+TEST_F(Labels, SmoothingMovesPointsWithinTheirCells) {
+  const Int3 extent{70, 70, 70};
+  const Field<std::uint8_t> ball(extent, [](Int3 p) {
+    const Int3 d = p - Int3{35, 35, 35};
+    return dot(d, d) < 30 * 30 ? 1.0 : 0.0;
+  });
+  const StoreReader s = store(ball);
+  const Mesh rough = meshes_of(s).at(1);
+  const auto farthest = [](const Mesh& mesh) {
+    float most = 0;
+    for (const Vec3f& p : mesh.positions) {
+      const Vec3f d = p - Vec3f{35, 35, 35};
+      most = std::max(most, std::abs(std::sqrt(dot(d, d)) - 30));
+    }
+    return most;
+  };
+  const Mesh smooth = meshes_of(s, {.smooth = 6}).at(1);
+  EXPECT_EQ(smooth.triangles.size(), rough.triangles.size());
+  EXPECT_LT(farthest(smooth), farthest(rough));
+  EXPECT_NEAR(enclosed_volume(smooth), enclosed_volume(rough), 0.01 * enclosed_volume(rough));
+  for (std::size_t i = 0; i < rough.positions.size(); ++i)
+    for (int axis = 0; axis < 3; ++axis)
+      EXPECT_EQ(std::floor(rough.positions[i][axis]),
+                std::min(std::floor(smooth.positions[i][axis]),
+                         std::ceil(smooth.positions[i][axis]) - 1));
+}
+
 TEST_F(Labels, ChosenLabelsTouchTheirBricksOnly) {
   Field<std::uint8_t> field(Int3{128, 128, 128});
   for_each_point({{2, 2, 2}, {20, 20, 20}}, [&](Int3 p) { field.at(p) = 5; });
@@ -278,6 +325,27 @@ TEST_F(Labels, EverySampleTypeGivesTheSameMeshes) {
   EXPECT_EQ(meshes_of(store(cells<std::uint32_t>(extent, 20, 6))), expected);
   EXPECT_EQ(meshes_of(store(cells<float>(extent, 20, 6))), expected);
   EXPECT_EQ(meshes_of(store(cells<double>(extent, 20, 6))), expected);
+}
+
+TEST_F(Labels, SinksOfUnweldedChunksGetTheSameTriangles) {
+  const StoreReader s = store(cells<std::uint8_t>({50, 40, 40}, 8, 13));
+  extract_labels(s, {.threads = 1}, [](const LabelMesh& label) {
+    isobrick::Mesh mesh;
+    MemorySink sink(mesh);
+    label.write(sink);
+    std::size_t next = 0;
+    FunctionSink unwelded(
+        [&](const MeshChunk& chunk) {
+          for (const Triangle& t : chunk.triangles) {
+            for (std::size_t i = 0; i < 3; ++i)
+              EXPECT_EQ(chunk.positions[t[i]], mesh.positions[mesh.triangles[next][i]]);
+            ++next;
+          }
+        },
+        Indexing::chunk_local);
+    label.write(unwelded);
+    EXPECT_EQ(next, mesh.triangles.size());
+  });
 }
 
 TEST_F(Labels, LargeAndNegativeLabels) {
@@ -326,6 +394,8 @@ TEST_F(Labels, RefusesWhatMakesNoSense) {
   EXPECT_THROW(meshes_of(s, {.labels = {{77, 77}}}), UsageError);
   EXPECT_NO_THROW(meshes_of(s, {.labels = {{70, 80}}}));
   EXPECT_THROW(meshes_of(s, {.labels = {{5, 4}}}), UsageError);
+  EXPECT_THROW(meshes_of(s, {.smooth = 7}), UsageError);
+  EXPECT_THROW(meshes_of(s, {.smooth = 1, .pass_band = 0}), UsageError);
   EXPECT_THROW(meshes_of(s, {.level = 9}), UsageError);
   EXPECT_THROW(meshes_of(s, {.roi = Box3{{0, 0, 0}, {21, 5, 5}}}), UsageError);
   Field<float> field(Int3{10, 10, 10});

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
 #include <vector>
 
 #include "io/volumes/synth/synth_math.h"
@@ -246,9 +247,10 @@ std::unique_ptr<SynthField<Real>> make_synth_field(const SynthOptions& options, 
     case SynthKind::sphere: return std::make_unique<Sphere<Real>>(options, box);
     case SynthKind::gyroid: return std::make_unique<Gyroid<Real>>(options, box);
     case SynthKind::marschner_lobb: return std::make_unique<MarschnerLobb<Real>>(options, box);
-    case SynthKind::mixing: break;
+    case SynthKind::mixing: return std::make_unique<MixingLayer<Real>>(options, box);
+    case SynthKind::cells: break;
   }
-  return std::make_unique<MixingLayer<Real>>(options, box);
+  throw std::logic_error("cells are labels and no field");
 }
 
 template std::unique_ptr<SynthField<float>> make_synth_field(const SynthOptions&, Box3);

@@ -16,7 +16,7 @@ class SynthField {
   virtual void row(Index y, Index z, Real* out) = 0;
 };
 
-/// `options.frequency` is set.
+/// `options.frequency` is set; not for SynthKind::cells, which is no field (SynthCells).
 template <class Real>
 std::unique_ptr<SynthField<Real>> make_synth_field(const SynthOptions& options, Box3 box);
 

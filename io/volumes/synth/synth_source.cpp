@@ -11,14 +11,15 @@
 
 #include <isobrick/error.h>
 #include <isobrick/lattice.h>
+#include "io/volumes/synth/synth_cells.h"
 #include "io/volumes/synth/synth_field.h"
 
 namespace isobrick::inline v0 {
 namespace {
 
-constexpr std::string_view kNames[] = {"sphere", "gyroid", "marschner-lobb", "mixing"};
+constexpr std::string_view kNames[] = {"sphere", "gyroid", "marschner-lobb", "mixing", "cells"};
 constexpr SynthKind kKinds[] = {SynthKind::sphere, SynthKind::gyroid, SynthKind::marschner_lobb,
-                                SynthKind::mixing};
+                                SynthKind::mixing, SynthKind::cells};
 
 /// float where it resolves all of the type's values.
 template <class T>
@@ -58,7 +59,10 @@ class SynthSource final : public VolumeSource {
 
   void read(Box3 box, std::byte* out) override {
     if (box.empty()) return;
-    visit_scalar(options_.type, [&](auto tag) { fill<typename decltype(tag)::type>(box, out); });
+    visit_scalar(options_.type, [&](auto tag) {
+      using T = typename decltype(tag)::type;
+      options_.kind == SynthKind::cells ? fill_labels<T>(box, out) : fill<T>(box, out);
+    });
   }
 
  private:
@@ -77,9 +81,43 @@ class SynthSource final : public VolumeSource {
       }
   }
 
+  template <class T>
+  void fill_labels(Box3 box, std::byte* out) const {
+    SynthCells cells(options_, box);
+    std::vector<std::uint32_t> row(static_cast<std::size_t>(box.extent().x));
+    for (Index z = box.lo.z; z < box.hi.z; ++z)
+      for (Index y = box.lo.y; y < box.hi.y; ++y) {
+        cells.row(y, z, row.data());
+        for (const std::uint32_t label : row) {
+          const auto sample = static_cast<T>(label);
+          std::memcpy(out, &sample, sizeof(T));
+          out += sizeof(T);
+        }
+      }
+  }
+
   SynthOptions options_;
   VolumeInfo info_;
 };
+
+/// Throws UsageError where the type has no room for the labels.
+void check_cells(const SynthOptions& options) {
+  const double labels = SynthCells::max_label(options);
+  const double most = visit_scalar(options.type, [](auto tag) {
+    using Limits = std::numeric_limits<typename decltype(tag)::type>;
+    return Limits::is_integer ? static_cast<double>(Limits::max())
+                              : std::ldexp(1.0, Limits::digits);
+  });
+  if (labels > std::min(most, 4294967295.0))
+    throw UsageError(fmt::format(
+        "{:.0f} labels are too many for samples of type {}: choose a larger type or a smaller "
+        "frequency",
+        labels, short_name(options.type)));
+}
+
+double default_frequency(SynthKind kind) {
+  return kind == SynthKind::mixing ? 6.0 : kind == SynthKind::cells ? 5.0 : 2.0;
+}
 
 }  // namespace
 
@@ -109,13 +147,13 @@ std::unique_ptr<VolumeSource> make_synth(const SynthOptions& options) {
   // Finer structure than this is not structure any more.
   const double finest = std::max(2.0, static_cast<double>(std::max({e.x, e.y, e.z})));
   SynthOptions complete = options;
-  if (!complete.frequency)
-    complete.frequency = std::min(options.kind == SynthKind::mixing ? 6.0 : 2.0, finest);
+  if (!complete.frequency) complete.frequency = std::min(default_frequency(options.kind), finest);
   if (!(*complete.frequency > 0 && *complete.frequency <= finest))
     throw UsageError(fmt::format("a frequency of {} is not between 0 and the longest edge",
                                  *complete.frequency));
   if (!std::isfinite(options.noise) || options.noise < 0)
     throw UsageError("the noise is negative or not a number");
+  if (options.kind == SynthKind::cells) check_cells(complete);
   return std::make_unique<SynthSource>(complete);
 }
 

@@ -13,7 +13,7 @@ namespace isobrick::inline v0 {
 namespace {
 
 constexpr SynthKind kKinds[] = {SynthKind::sphere, SynthKind::gyroid, SynthKind::marschner_lobb,
-                                SynthKind::mixing};
+                                SynthKind::mixing, SynthKind::cells};
 
 std::uint64_t fnv(const std::string& bytes) {
   std::uint64_t hash = 0xcbf29ce484222325u;
@@ -72,6 +72,9 @@ TEST(SynthSource, GoldenBytes) {
       {SynthKind::mixing,
        {0x168edf2592e60d92, 0x26ebab26279e0012, 0xeee6fa2aa8769db4, 0x06956a9993c54e34,
         0x62bb0c3d13dce6e0, 0xa746e84567565960, 0xe5a645e930269832, 0x338d00ba346a9536}},
+      {SynthKind::cells,
+       {0x14e2acdb5a225aa0, 0x14e2acdb5a225aa0, 0xe7b2a7d5fbc1da54, 0xe7b2a7d5fbc1da54,
+        0xe5d2c2f743ef3394, 0xe5d2c2f743ef3394, 0x8fa62e75c162a617, 0x757dbccb19b798ed}},
   };
   for (const SynthKind kind : kKinds)
     for (const ScalarType type : kScalarTypes)
@@ -98,6 +101,25 @@ TEST(SynthSource, BoxesAgreeWithTheWhole) {
         });
       }
     }
+}
+
+TEST(SynthSource, CellsAreNumbered) {
+  SynthOptions o = options(SynthKind::cells, ScalarType::u16, {64, 64, 64});
+  o.frequency = 4;
+  const std::string bytes = whole(o);
+  std::map<std::uint16_t, int> samples;
+  for (std::size_t i = 0; i < bytes.size(); i += 2) {
+    std::uint16_t label;
+    std::memcpy(&label, bytes.data() + i, 2);
+    ++samples[label];
+  }
+  EXPECT_EQ(samples.size(), 65u);
+  EXPECT_EQ(samples.rbegin()->first, 64);
+  EXPECT_GT(samples[0], 64 * 64 * 64 / 20);
+  EXPECT_LT(samples[0], 64 * 64 * 64 / 2);
+  o.type = ScalarType::u8;
+  o.frequency = 8;
+  EXPECT_THROW(make_synth(o), UsageError);
 }
 
 TEST(SynthSource, IsovaluesLieBetweenSamples) {
@@ -132,6 +154,7 @@ TEST(SynthSource, FrequencySetsTheGyroidsActiveCells) {
 
 TEST(SynthSource, EveryKindHasASurface) {
   for (const SynthKind kind : kKinds) {
+    if (kind == SynthKind::cells) continue;  // is no field
     const Shares s = shares(options(kind, ScalarType::u8, {64, 64, 64}));
     EXPECT_GT(s.active, 0.01) << name_of(kind);
     EXPECT_GT(s.inside, 0.1) << name_of(kind);
