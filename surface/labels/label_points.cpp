@@ -47,25 +47,29 @@ std::uint64_t LabelPoints::max_bytes(int edge) {
   const auto cells = static_cast<std::uint64_t>(edge) * static_cast<std::uint64_t>(edge) *
                      static_cast<std::uint64_t>(edge);
   // Vectors that grow hold twice as much as they need at most.
-  return cells * (sizeof(std::uint32_t) +
-                  2 * (sizeof(std::uint32_t) + sizeof(std::uint16_t) + 2 * sizeof(Vec3f)));
+  return cells * (sizeof(std::uint32_t) + 2 * (sizeof(std::uint32_t) + sizeof(std::uint16_t) + 1 +
+                                               sizeof(Neighbours) + 2 * sizeof(Vec3f)));
 }
 
 void LabelPoints::clear() {
   cells_.clear();
   edges_.clear();
+  junctions_.clear();
   points_.clear();
 }
 
-void LabelPoints::add(int cell, int edges) {
+void LabelPoints::add(int cell, int edges, int junctions) {
   static const FirstPoints first;
   index_of_[static_cast<std::size_t>(cell)] = static_cast<std::uint32_t>(cells_.size());
   cells_.push_back(static_cast<std::uint32_t>(cell));
   edges_.push_back(static_cast<std::uint16_t>(edges));
+  junctions_.push_back(static_cast<std::uint8_t>(junctions));
   points_.push_back(first.of[static_cast<std::size_t>(edges)]);
 }
 
 void LabelPoints::smooth(const LabelSmoothing& smoothing) {
+  if (smoothing.iterations == 0) return;
+  find_neighbours();
   // As SmoothStage: the pass band is 1 / λ + 1 / μ.
   constexpr double lambda = 0.6307;
   const double mu = 1 / (smoothing.pass_band - 1 / lambda);
@@ -75,25 +79,39 @@ void LabelPoints::smooth(const LabelSmoothing& smoothing) {
   }
 }
 
-/// Moves every point by a part of its way to the mean of its neighbours. Cells at the border of the
-/// window lack neighbours; what depends on them is not used.
-void LabelPoints::step(float factor) {
+/// Cells at the border of the window lack neighbours; what depends on them is not used.
+void LabelPoints::find_neighbours() {
   constexpr auto face_edges = edges_of_faces();
   const std::array<int, 3> steps{1, edge_, edge_ * edge_};
-  moved_.resize(points_.size());
+  neighbours_.resize(points_.size());
   for (std::size_t i = 0; i < points_.size(); ++i) {
     const auto cell = static_cast<int>(cells_[i]);
     const std::array<int, 3> place{cell % edge_, cell / edge_ % edge_, cell / (edge_ * edge_)};
+    // A line that ends in the cell has nowhere to go on.
+    const bool on_line = std::popcount(junctions_[i]) > 1;
+    for (std::size_t face = 0; face < 6; ++face) {
+      const std::size_t axis = face / 2;
+      const int direction = face % 2 ? 1 : -1;
+      const int at = place[axis] + direction;
+      const bool is_near =
+          on_line ? junctions_[i] >> face & 1 : (edges_[i] & face_edges[face]) != 0;
+      neighbours_[i].of_face[face] =
+          is_near && at >= 0 && at < edge_ - 1 ? index_of(cell + direction * steps[axis]) : kNone;
+    }
+  }
+}
+
+/// Moves every point by a part of its way to the mean of its neighbours.
+void LabelPoints::step(float factor) {
+  moved_.resize(points_.size());
+  for (std::size_t i = 0; i < points_.size(); ++i) {
     Vec3f sum;
     float count = 0;
     for (int face = 0; face < 6; ++face) {
-      if (!(edges_[i] & face_edges[static_cast<std::size_t>(face)])) continue;
-      const auto axis = static_cast<std::size_t>(face / 2);
-      const int direction = face % 2 ? 1 : -1;
-      const int at = place[axis] + direction;
-      if (at < 0 || at >= edge_ - 1) continue;
-      Vec3f neighbour = points_[index_of(cell + direction * steps[axis])];
-      neighbour[face / 2] += static_cast<float>(direction);
+      const std::uint32_t index = neighbours_[i].of_face[static_cast<std::size_t>(face)];
+      if (index == kNone) continue;
+      Vec3f neighbour = points_[index];
+      neighbour[face / 2] += face % 2 ? 1.0f : -1.0f;
       sum = sum + neighbour;
       ++count;
     }

@@ -27,7 +27,8 @@ struct LabelSmoothing {
 /// The points of the cells whose corners have different labels. In the beginning each is the mean
 /// of the middles of the edges that join different labels. Smoothing moves a point towards the
 /// points behind the faces that a boundary passes, and keeps it in its cell, so points of different
-/// cells never pass each other (Gibson 1998). All labels share the points.
+/// cells never pass each other (Gibson 1998). Where three labels meet along a line, a point moves
+/// towards its neighbours on the line only. All labels share the points.
 class LabelPoints {
  public:
   /// Cells are numbers in a window of edge³ cells.
@@ -35,8 +36,9 @@ class LabelPoints {
       : edge_(edge), index_of_(static_cast<std::size_t>(edge * edge * edge)) {}
 
   void clear();
-  /// Adds a cell, in ascending order. `edges` are those of different ends, as bits.
-  void add(int cell, int edges);
+  /// Adds a cell, in ascending order: its edges of different ends, and its faces whose corners have
+  /// three labels or more, as bits.
+  void add(int cell, int edges, int junctions);
   void smooth(const LabelSmoothing& smoothing);
 
   std::span<const std::uint32_t> cells() const { return cells_; }
@@ -49,12 +51,20 @@ class LabelPoints {
   static std::uint64_t max_bytes(int edge);
 
  private:
+  struct Neighbours {
+    std::array<std::uint32_t, 6> of_face;  ///< kNone where the point does not move towards it
+  };
+  static constexpr std::uint32_t kNone = ~std::uint32_t{0};
+
+  void find_neighbours();
   void step(float factor);
 
   int edge_;
   std::vector<std::uint32_t> index_of_;
   std::vector<std::uint32_t> cells_;
   std::vector<std::uint16_t> edges_;
+  std::vector<std::uint8_t> junctions_;
+  std::vector<Neighbours> neighbours_;
   std::vector<Vec3f> points_, moved_;
 };
 

@@ -175,18 +175,25 @@ void LabelTile::find_points() {
       std::uint64_t cells = (along_x[row] | along_x[row + 1] | along_x[behind] |
                              along_x[behind + 1] | sides | sides >> 1) &
                             in_row;
-      for (; cells; cells &= cells - 1) {
-        const int cell = window_.at(std::countr_zero(cells), y, z);
-        const auto id = [&](int corner) {
-          return ids_[static_cast<std::size_t>(cell + corner_at(corner))];
-        };
-        int edges = 0;
-        for (int e = 0; e < 12; ++e)
-          edges |= (id(low_corner(e)) != id(low_corner(e) | 1 << e / 4)) << e;
-        points_.add(cell, edges);
-      }
+      for (; cells; cells &= cells - 1) add_point(window_.at(std::countr_zero(cells), y, z));
     }
   points_.smooth(smoothing_);
+}
+
+void LabelTile::add_point(int cell) {
+  const auto id = [&](int corner) {
+    return ids_[static_cast<std::size_t>(cell + corner_at(corner))];
+  };
+  int edges = 0, junctions = 0;
+  for (int e = 0; e < 12; ++e) edges |= (id(low_corner(e)) != id(low_corner(e) | 1 << e / 4)) << e;
+  for (int face = 0; face < 6; ++face) {
+    const auto& c = case_rule::kFaces[face];
+    int changes = 0;  // around the face; two labels change twice, or four times across a diagonal
+    for (int i = 0; i < 4; ++i) changes += id(c[i]) != id(c[(i + 1) % 4]);
+    const bool is_checkered = id(c[0]) == id(c[2]) && id(c[1]) == id(c[3]);
+    junctions |= (changes > 2 && !is_checkered) << face;
+  }
+  points_.add(cell, edges, junctions);
 }
 
 void LabelTile::visit_cells() {

@@ -103,6 +103,7 @@ class LabelTile {
   Id id_of(std::int64_t label);
   void find_edges();
   void find_points();
+  void add_point(int cell);
   void visit_cells();
   void visit_cell(int cell, const std::array<int, 3>& place);
   int corner_at(int corner) const;
