@@ -11,6 +11,7 @@
 #include <isobrick/histogram.h>
 #include <isobrick/index_build.h>
 #include <isobrick/isovalue.h>
+#include <isobrick/labels.h>
 #include <isobrick/mesh.h>
 #include <isobrick/mesh_file_sink.h>
 #include <isobrick/mesh_filters.h>

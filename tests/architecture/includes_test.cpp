@@ -64,6 +64,7 @@ const std::map<std::string, Names> kPublicHeaders = {
     {"pipeline/export", {"export"}},
     {"pipeline/extract", {"estimate", "extract", "index_choice"}},
     {"pipeline/index", {"index_build"}},
+    {"pipeline/labels", {"labels"}},
     {"pipeline/verify", {"verify"}},
     {"pipeline/volume", {"device_extractor", "volume", "volume_extractor"}},
     {"isobrick", {"isobrick"}},

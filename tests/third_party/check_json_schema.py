@@ -101,6 +101,10 @@ def run_commands(check):
     for output in ("e.ply", "e.stl"):
         check.run("extract_estimate", "extract", "a.zarr", "--isovalue", "128", "--estimate",
                   "-o", output)
+    check.run("synth", "synth", "cells", "cells.zarr", "--dims", "30,30,30", "--type", "u8")
+    check.run("extract_labels", "extract", "cells.zarr", "--labels", "all", "-o", "meshes",
+              "--measure")
+    check.validate("label_list", (folder / "meshes" / "labels.json").read_text(), "labels.json")
     for command in (["man"], ["completion", "bash"], ["help", "info"]):
         check.run("text", *command)
     if "not in this program" not in subprocess.run([check.isobrick, "help", "view"], text=True,

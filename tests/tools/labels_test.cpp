@@ -1,0 +1,154 @@
+#include <filesystem>
+
+#include "tests/tools/program.h"
+
+namespace isobrick::test {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// `extract --labels`.
+class LabelOption : public ProgramTest {
+ protected:
+  LabelOption() : store_(path("cells.zarr")) {
+    const Outcome made = run({"synth", "cells", store_, "--dims", "60,50,40", "--type", "u8",
+                              "--brick", "16", "--downsample", "mode"});
+    EXPECT_EQ(made.exit_code, 0) << made.err;
+  }
+
+  nlohmann::json extract(const Arguments& more) const {
+    Arguments words{"extract", store_};
+    words.insert(words.end(), more.begin(), more.end());
+    return run_json(words);
+  }
+  Outcome refused(const Arguments& more) const {
+    Arguments words{"extract", store_, "-o", path("never")};
+    words.insert(words.end(), more.begin(), more.end());
+    Outcome outcome = run(words);
+    EXPECT_FALSE(fs::exists(path("never")));
+    EXPECT_EQ(files(), (std::vector<std::string>{"cells.zarr"}));
+    return outcome;
+  }
+  nlohmann::json list(const std::string& folder) const {
+    return nlohmann::json::parse(read_file(path(folder) + "/labels.json"));
+  }
+
+  std::string store_;
+};
+
+TEST_F(LabelOption, WritesAMeshOfEachLabelAndAList) {
+  const nlohmann::json json = extract({"--labels", "all", "-o", path("out")});
+  EXPECT_EQ(json["output"], path("out"));
+  EXPECT_EQ(json["level"], 0);
+  EXPECT_GT(json["bricks"]["read"].get<int>(), 0);
+  EXPECT_GT(json["scratch_bytes"].get<int>(), 0);
+  EXPECT_GT(json["peak_resident_bytes"].get<std::uint64_t>(), 0u);
+  const nlohmann::json labels = list("out")["labels"];
+  ASSERT_EQ(labels.size(), json["labels"].get<std::size_t>());
+  EXPECT_GT(labels.size(), 50u);
+  std::uint64_t triangles = 0, bytes = 0;
+  std::int64_t last = 0;
+  for (const nlohmann::json& entry : labels) {
+    EXPECT_GT(entry["label"].get<std::int64_t>(), last);
+    last = entry["label"].get<std::int64_t>();
+    triangles += entry["triangles"].get<std::uint64_t>();
+    EXPECT_EQ(entry["file"], std::to_string(last) + ".ply");
+    const std::string mesh = read_file(path("out") + "/" + entry["file"].get<std::string>());
+    bytes += mesh.size();
+    EXPECT_NE(mesh.find("element face " + entry["triangles"].dump()), std::string::npos);
+    EXPECT_NE(mesh.find("element vertex " + entry["vertices"].dump()), std::string::npos);
+  }
+  EXPECT_EQ(json["triangles"], triangles);
+  EXPECT_EQ(json["output_bytes"], bytes + fs::file_size(path("out") + "/labels.json"));
+  EXPECT_EQ(files(), (std::vector<std::string>{"cells.zarr", "out"}));
+}
+
+TEST_F(LabelOption, ChoosesLabels) {
+  EXPECT_EQ(extract({"--labels", "7", "-o", path("one")})["labels"], 1);
+  const nlohmann::json some = extract({"--labels", "7,10:12", "-o", path("some/")});
+  EXPECT_EQ(some["labels"], 4);
+  EXPECT_EQ(read_file(path("one/7.ply")), read_file(path("some/7.ply")));
+  EXPECT_EQ(extract({"--labels", "0", "-o", path("background")})["labels"], 1);
+}
+
+TEST_F(LabelOption, WritesEveryFormat) {
+  for (const char* format : {"stl", "obj", "glb", "vtp"}) {
+    const nlohmann::json json = extract({"--labels", "7", "--format", format, "-o", path(format)});
+    EXPECT_GT(fs::file_size(path(format) + "/7." + format), 1000u);
+    EXPECT_EQ(list(format)["labels"][0]["triangles"], json["triangles"]);
+  }
+  EXPECT_TRUE(list("stl")["labels"][0]["vertices"].is_null());
+  extract({"--labels", "7", "--format", "glb", "--quantize", "-o", path("small")});
+  EXPECT_LT(fs::file_size(path("small/7.glb")), fs::file_size(path("glb/7.glb")));
+}
+
+TEST_F(LabelOption, FiltersEachMesh) {
+  extract({"--labels", "5:9", "-o", path("plain"), "--measure"});
+  extract(
+      {"--labels", "5:9", "-o", path("few"), "--simplify", "10%", "--measure", "--smooth", "3"});
+  for (std::size_t i = 0; i < 5; ++i) {
+    const nlohmann::json plain = list("plain")["labels"][i], few = list("few")["labels"][i];
+    EXPECT_EQ(plain["measure"]["closed"], true);
+    EXPECT_EQ(few["measure"]["closed"], true);
+    EXPECT_LT(few["triangles"].get<int>(), plain["triangles"].get<int>() / 8);
+  }
+}
+
+TEST_F(LabelOption, TakesAnyInput) {
+  write_file(path("a_8x8x8_uint8.raw"), std::string(512, '\x03'));
+  run_json({"extract", path("a_8x8x8_uint8.raw"), "--labels", "all", "-o", path("raw"), "--cache",
+            "none"});
+  EXPECT_EQ(list("raw")["labels"][0]["label"], 3);
+  const nlohmann::json region =
+      extract({"--labels", "all", "--roi", "0:20,0:20,0:20", "-o", path("part")});
+  EXPECT_LT(region["labels"].get<int>(), 30);
+}
+
+TEST_F(LabelOption, ReplacesOnlyItsOwnFolder) {
+  extract({"--labels", "7", "-o", path("out")});
+  const Arguments again{"extract", store_, "--labels", "8", "-o", path("out")};
+  expect_refused(run(again), 2, {"exists already", "--force"});
+  EXPECT_EQ(extract({"--labels", "8", "-o", path("out"), "--force"})["labels"], 1);
+  EXPECT_FALSE(fs::exists(path("out/7.ply")));
+  EXPECT_TRUE(fs::exists(path("out/8.ply")));
+  write_file(path("out/notes.txt"), "mine");
+  Arguments forced = again;
+  forced.push_back("--force");
+  expect_refused(run(forced), 2, {"notes.txt", "move it away"});
+  EXPECT_TRUE(fs::exists(path("out/notes.txt")));
+  write_file(path("file"), "");
+  expect_refused(run({"extract", store_, "--labels", "8", "-o", path("file"), "--force"}), 2,
+                 {"is no folder"});
+}
+
+TEST_F(LabelOption, RefusesWhatMakesNoSense) {
+  expect_refused(refused({"--labels", "300"}), 2, {"has no label 300"});
+  expect_refused(refused({"--labels", "7", "--roi", "50:60,40:50,30:40"}), 2,
+                 {"has no label 7 in the region"});
+  expect_refused(refused({"--labels", "x"}), 2, {"'x' is no label"});
+  expect_refused(refused({"--labels", "3,"}), 2, {"'' is no label"});
+  expect_refused(refused({"--labels", "9:5"}), 2, {"ends before it begins"});
+  expect_refused(refused({"--labels", "99999999999999999999"}), 2, {"is no label"});
+  expect_refused(refused({"--labels", "all", "--isovalue", "3"}), 2, {"--isovalue", "--labels"});
+  expect_refused(refused({"--labels", "all", "--cap"}), 2, {"--cap", "--labels"});
+  expect_refused(refused({"--labels", "all", "--smooth", "7"}), 2, {"0 to 6"});
+  expect_refused(refused({"--labels", "all", "--level", "9"}), 2, {"level 9"});
+  expect_refused(refused({"--labels", "all", "--format", "pvtp"}), 2, {"PVTP"});
+  expect_refused(refused({"--labels", "all", "--quantize"}), 2, {"--format glb"});
+  expect_refused(refused({"--labels", "all", "--memory", "20M"}), 2, {"--memory"});
+  expect_refused(run({"extract", store_, "--labels", "all", "-o", path("a.ply")}), 2,
+                 {"a folder with a mesh for each label"});
+  expect_refused(run({"extract", store_, "--labels", "all", "-o", "-"}), 2, {"name a folder"});
+}
+
+TEST_F(LabelOption, RefusesSamplesThatAreNoLabels) {
+  const Outcome made =
+      run({"synth", "sphere", path("b.zarr"), "--dims", "30,30,30", "--type", "f32"});
+  ASSERT_EQ(made.exit_code, 0) << made.err;
+  expect_refused(run({"extract", path("b.zarr"), "--labels", "all", "-o", path("never")}), 1,
+                 {"is no label image"});
+  EXPECT_FALSE(fs::exists(path("never")));
+}
+
+}  // namespace
+}  // namespace isobrick::test
