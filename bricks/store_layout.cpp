@@ -47,6 +47,7 @@ ImageMetadata image_metadata(const StoreLayout& layout) {
   image.name = layout.name;
   image.grid_class = layout.grid_class;
   image.grid_name = layout.grid_name;
+  image.labels = layout.labels;
   if (layout.levels.size() > 1) image.downsampling = name_of(layout.downsampling);
   for (std::size_t i = 0; i < layout.levels.size(); ++i)
     image.levels.push_back({std::to_string(i), layout.levels[i].transform});

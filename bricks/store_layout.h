@@ -24,8 +24,9 @@ struct StoreLayout {
   double fill_value = 0;
   bool may_have_nan = false;
   std::string name;
-  std::string grid_class;  ///< as OpenVDB calls it, or empty
-  std::string grid_name;   ///< of the OpenVDB grid, or empty
+  std::string grid_class;            ///< as OpenVDB calls it, or empty
+  std::string grid_name;             ///< of the OpenVDB grid, or empty
+  std::optional<LabelTable> labels;  ///< as VolumeInfo::labels
 
   CodecChain codecs() const {
     return ome == OmeVersion::v04 ? CodecChain::ours_v2(zstd_level) : CodecChain::ours(zstd_level);

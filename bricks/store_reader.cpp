@@ -129,6 +129,7 @@ void StoreReader::Impl::open(const Selection& selection) {
   info.type = info.levels[0].lattice.type;
   info.grid_class = image.grid_class;
   info.grid_name = image.grid_name;
+  info.labels = image.labels;
   info.fill_value = levels[0].metadata.fill_value;
   info.codec = levels[0].metadata.codecs.name();
   info.may_have_nan = is_floating(info.type) && may_have_nan.value_or(true);

@@ -17,6 +17,7 @@
 #include "io/bytes/output_guard.h"
 #include "pipeline/program_memory.h"
 #include "tools/format.h"
+#include "tools/label_report.h"
 #include "tools/measure_report.h"
 #include "tools/mesh_output.h"
 #include "tools/output_name.h"
@@ -136,7 +137,11 @@ class LabelWriter {
                                                         .quantize = arguments_.quantize,
                                                         .threads = 1,
                                                         .memory = plan_.mesh_bytes});
-    ordered_json entry{{"label", mesh.label()}, {"file", name}};
+    ordered_json entry{{"label", mesh.label()}};
+    if (const LabelProperties* properties = find_properties(mesh.label())) {
+      add_properties(entry, *properties);
+    }
+    entry["file"] = name;
     MeshSize size = mesh.size();
     if (filter_.any()) {
       MeshFilterOptions options = filter_;
@@ -179,6 +184,16 @@ class LabelWriter {
   std::uint64_t bytes() const { return bytes_; }
 
  private:
+  /// What the image says of a label; null: nothing.
+  const LabelProperties* find_properties(std::int64_t label) const {
+    if (!store_.info().labels) return nullptr;
+    const LabelTable& table = *store_.info().labels;
+    const auto at = std::lower_bound(
+        table.begin(), table.end(), label,
+        [](const LabelProperties& p, std::int64_t value) { return p.label < value; });
+    return at != table.end() && at->label == label ? &*at : nullptr;
+  }
+
   const ExtractArguments& arguments_;
   const StoreReader& store_;
   fs::path folder_;
@@ -231,8 +246,8 @@ int run_extract_labels(const ExtractArguments& given, Console& console) {
   check_label_arguments(arguments);
   const std::string output = folder_name(arguments);
   check_replaces_no_input(output, std::array<fs::path, 1>{arguments.input.path});
-  const OpenedVolume input =
-      open_input(arguments.input, arguments.memory, arguments.threads, console);
+  const OpenedVolume input = open_input(arguments.input, arguments.memory, arguments.threads,
+                                        console, true, Downsampling::mode);
   const StoreReader& store = input.store();
   choose_mesh_unit(arguments, store, console);
   LabelOptions options{.labels = *arguments.labels,

@@ -8,6 +8,7 @@
 
 #include <isobrick/store_reader.h>
 #include "bricks/stored_index.h"
+#include "bricks/zarr/label_metadata.h"
 #include "bricks/zarr/metadata_files.h"
 #include "io/bytes/folder_walk.h"
 #include "tools/format.h"
@@ -15,6 +16,7 @@
 #include "tools/info_source.h"
 #include "tools/info_volumes.h"
 #include "tools/input.h"
+#include "tools/label_report.h"
 #include "tools/open_store.h"
 #include "tools/value_range.h"
 
@@ -100,6 +102,7 @@ struct StoreFacts {
   std::optional<Histogram> histogram;
   std::string no_histogram;  ///< why there is none
   std::vector<IndexFacts> indexes;
+  std::vector<std::string> label_images;  ///< in its group `labels`
 
   std::optional<double> ratio() const {
     if (!bytes) return std::nullopt;
@@ -124,6 +127,7 @@ StoreFacts gather(const StoreReader& store, bool stats, std::uint64_t memory, Pr
   facts.stored.resize(info.levels.size());
   facts.has_ranges = store.has_ranges(0);
   facts.indexes = indexes_of(store, stats);
+  facts.label_images = label_image_names(*store.storage());
   if (stats) {
     facts.bytes = bytes_of(store.storage()->local_path());
     for (std::size_t i = 0; i < facts.stored.size(); ++i)
@@ -193,6 +197,8 @@ ordered_json json_of(const std::string& path, const StoreInfo& info, const Store
       {"fill_value", info.fill_value},
       {"grid_class", info.grid_class},
       {"grid_name", info.grid_name},
+      {"labels", labels_json(info.labels)},
+      {"label_images", facts.label_images},
       {"levels", levels_json(info, facts)},
       {"bytes", json_or_null(facts.bytes)},
       {"raw_bytes", facts.raw_bytes},
@@ -277,6 +283,9 @@ std::string text_of(const std::string& path, const StoreInfo& info, const StoreF
   text += place_text(info.levels.front().transform);
   if (!info.grid_name.empty()) text += fmt::format("grid         {}\n", info.grid_name);
   if (!info.grid_class.empty()) text += fmt::format("grid class   {}\n", info.grid_class);
+  text += labels_text(info.labels);
+  if (!facts.label_images.empty())
+    text += fmt::format("label images {}\n", fmt::join(facts.label_images, ", "));
   text += levels_text(info, facts);
   text += fmt::format("codec        {}\n", info.codec);
   text += bytes_text(facts) + range_text(info, facts) + indexes_text(facts);

@@ -9,6 +9,7 @@
 #include <isobrick/open_source.h>
 #include "io/volumes/open/volume_format.h"
 #include "tools/format.h"
+#include "tools/label_report.h"
 
 namespace isobrick::tools {
 namespace {
@@ -40,6 +41,8 @@ nlohmann::ordered_json json_of(const InputArguments& input, const VolumeInfo& in
           {"fill_value", info.fill_value},
           {"grid_class", info.grid_class},
           {"grid_name", info.grid_name},
+          {"labels", labels_json(info.labels)},
+          {"label_images", nlohmann::ordered_json::array()},
           {"levels", nlohmann::ordered_json::array()},
           {"files", file_count(info)},
           {"bytes", nullptr},
@@ -71,6 +74,7 @@ void report_source(const InputArguments& input, Console& console) {
   text += place_text(info.transform);
   if (!info.grid_name.empty()) text += fmt::format("grid         {}\n", info.grid_name);
   if (!info.grid_class.empty()) text += fmt::format("grid class   {}\n", info.grid_class);
+  text += labels_text(info.labels);
   text += "histogram    with --stats, which reads all samples\n";
   console.result(json_of(input, info, notes, raw_bytes), text);
   for (const std::string& note : notes) console.note(note);

@@ -60,7 +60,8 @@ void add_input(CLI::App* app, InputArguments& input, bool required) {
 }
 
 OpenedVolume open_input(const InputArguments& input, std::uint64_t memory, int threads,
-                        Console& console, bool needs_ranges) {
+                        Console& console, bool needs_ranges,
+                        std::optional<Downsampling> downsampling) {
   check_input(input.path);
   if (!input.cache.folder.empty())
     set_interrupt_note([] { return "the same command goes on with what is done"; });
@@ -70,6 +71,7 @@ OpenedVolume open_input(const InputArguments& input, std::uint64_t memory, int t
                           {.volume = input.volume,
                            .cache = input.cache,
                            .needs_ranges = needs_ranges,
+                           .downsampling = downsampling,
                            .memory = memory,
                            .threads = threads,
                            .on_note = [&](const std::string& note) { console.note(note); }},

@@ -22,8 +22,10 @@ void add_input(CLI::App* app, InputArguments& input, bool required = true);
 void add_volume_options(CLI::App* app, VolumeRequest& volume);
 
 /// Opens the input as a store, by way of the cache where it is none, and writes what it notes.
+/// `downsampling` is that of a conversion.
 /// Throws Error and UsageError with what to type instead where it is no volume.
 OpenedVolume open_input(const InputArguments& input, std::uint64_t memory, int threads,
-                        Console& console, bool needs_ranges = true);
+                        Console& console, bool needs_ranges = true,
+                        std::optional<Downsampling> downsampling = {});
 
 }  // namespace isobrick::tools

@@ -235,7 +235,7 @@ void add_store_options(CLI::App* app, ConvertOptions& options) {
       [&options](const std::string& text) { options.factors.push_back(parse_dims(text)); });
   add_parsed(app, options.downsampling, parse_downsampling_name,
              {"--downsample", "mean|max|min|mode|stride",
-              "What such samples become; mode suits labels", "mean"});
+              "What such samples become; mode suits labels", "mean, of a label image mode"});
   add_parsed(
       app, options.ome,
       [](const std::string& text) {

@@ -9,6 +9,7 @@
 #include <isobrick/error.h>
 #include "bricks/zarr/codec.h"
 #include "bricks/zarr/json_reader.h"
+#include "bricks/zarr/label_metadata.h"
 #include "bricks/zarr/ome_transformations.h"
 
 namespace isobrick::inline v0 {
@@ -261,6 +262,7 @@ std::string to_json(const ImageMetadata& image) {
   attributes["ome"]["version"] = "0.5";
   attributes["ome"]["multiscales"] = Json::array({std::move(multiscale)});
   if (image.window) attributes["ome"]["omero"] = omero(image);
+  if (image.labels) attributes["ome"]["image-label"] = image_label_json(*image.labels);
   if (image.ours) attributes["isobrick"] = std::move(ours);
   Json json = Json::object();
   json["zarr_format"] = 3;
@@ -289,6 +291,7 @@ ImageMetadata parse_image_metadata(std::string_view text, const std::string& whe
   ImageMetadata image;
   parse_multiscales(ome.at("multiscales"), is_06(version), image);
   if (!image.leading.empty()) parse_channel_names(ome.raw(), image);
+  if (ome.has("image-label")) image.labels = parse_image_label(ome.at("image-label"));
   image.ours = attributes.has("isobrick");
   if (image.ours) parse_ours(attributes.at("isobrick"), image);
   return image;

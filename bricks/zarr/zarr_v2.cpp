@@ -98,6 +98,8 @@ std::string v3_from_zattrs(std::string_view text, const std::string& where) {
   group["attributes"] = {{"ome", {{"version", "0.5"}, {"multiscales", multiscales.raw()}}}};
   if (json.has("isobrick")) group["attributes"]["isobrick"] = json.at("isobrick").raw();
   if (json.has("omero")) group["attributes"]["ome"]["omero"] = json.at("omero").raw();
+  if (json.has("image-label"))
+    group["attributes"]["ome"]["image-label"] = json.at("image-label").raw();
   return group.dump();
 }
 
@@ -132,6 +134,10 @@ std::string to_zattrs(const ImageMetadata& image) {
   if (attributes["ome"].contains("omero")) {
     json["omero"] = attributes["ome"]["omero"];
     json["omero"]["version"] = "0.4";
+  }
+  if (attributes["ome"].contains("image-label")) {
+    json["image-label"] = attributes["ome"]["image-label"];
+    json["image-label"]["version"] = "0.4";
   }
   if (attributes.contains("isobrick")) json["isobrick"] = attributes["isobrick"];
   return json.dump(2) + "\n";

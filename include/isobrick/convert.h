@@ -28,10 +28,11 @@ struct ConvertOptions {
   /// From a level to the next, 1 or 2 an axis: of each step in turn, the last one of all further
   /// steps. Nothing: factors_by_spacing().
   std::vector<Int3> factors = {};
-  OmeVersion ome = OmeVersion::v05;                ///< 0.4 has no shards: `shard` does not matter
-  Downsampling downsampling = Downsampling::mean;  ///< how a level is made from the finer one
-  std::uint64_t memory = std::uint64_t{1} << 30;   ///< hard budget, bytes
-  int threads = 0;                                 ///< 0: all cores
+  OmeVersion ome = OmeVersion::v05;  ///< 0.4 has no shards: `shard` does not matter
+  /// How a level is made from the finer one. Nothing: by the mean; of a label image by the mode.
+  std::optional<Downsampling> downsampling = {};
+  std::uint64_t memory = std::uint64_t{1} << 30;  ///< hard budget, bytes
+  int threads = 0;                                ///< 0: all cores
   bool resume = false;  ///< go on with an interrupted conversion of the same input
   bool force = false;   ///< replace a store that exists (only when the new one is whole)
   std::vector<std::filesystem::path> inputs = {};  ///< never replaced, beside the source's files

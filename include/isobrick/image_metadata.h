@@ -9,6 +9,7 @@
 #include <vector>
 
 #include <isobrick/api.h>
+#include <isobrick/label_properties.h>
 #include <isobrick/transform.h>
 
 namespace isobrick::inline v0 {
@@ -52,6 +53,7 @@ struct ImageMetadata {
   std::optional<bool> may_have_nan;
   std::string grid_class;               ///< as OpenVDB calls it ("level set"), or empty
   std::string grid_name;                ///< of the OpenVDB grid, or empty
+  std::optional<LabelTable> labels;     ///< of a label image: `image-label`
   std::string downsampling;             ///< how coarser levels were made ("mean"): `type`; or empty
   std::optional<DisplayWindow> window;  ///< `omero`, which is written and never read
   /// The metadata_checksum() that the root states.

@@ -12,6 +12,7 @@
 #include <isobrick/mesh.h>
 #include <isobrick/progress.h>
 #include <isobrick/store_reader.h>
+#include <isobrick/volume.h>
 
 namespace isobrick::inline v0 {
 
@@ -87,6 +88,10 @@ struct LabelReport {
 /// that makes no sense, a label that is named and not there, and a budget too small; Error where a
 /// sample is no label.
 ISOBRICK_API LabelReport extract_labels(const StoreReader& store, const LabelOptions& options,
+                                        const LabelVisitor& visit,
+                                        Progress& progress = no_progress());
+/// The same of samples in memory, which are read in place, or behind a function.
+ISOBRICK_API LabelReport extract_labels(const Volume& volume, const LabelOptions& options,
                                         const LabelVisitor& visit,
                                         Progress& progress = no_progress());
 

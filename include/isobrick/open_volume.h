@@ -4,11 +4,13 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <stop_token>
 #include <string>
 #include <vector>
 
 #include <isobrick/api.h>
+#include <isobrick/downsampling.h>
 #include <isobrick/progress.h>
 #include <isobrick/store_reader.h>
 #include <isobrick/volume_request.h>
@@ -34,6 +36,7 @@ struct OpenOptions {
   CacheOptions cache = {};    ///< where stores that are made are kept
   /// Whether another program's Zarr without ranges is converted; false: it is opened in place.
   bool needs_ranges = true;
+  std::optional<Downsampling> downsampling = {};  ///< of a conversion, see ConvertOptions
   std::uint64_t memory = std::uint64_t{1} << 30;  ///< budget of the conversion, bytes
   int threads = 0;                                ///< 0: all cores
   /// Called with each of OpenedVolume::notes() when it comes up, which is before a conversion

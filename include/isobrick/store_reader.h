@@ -10,6 +10,7 @@
 #include <vector>
 
 #include <isobrick/api.h>
+#include <isobrick/label_properties.h>
 #include <isobrick/lattice.h>
 #include <isobrick/level_info.h>
 #include <isobrick/range_table.h>
@@ -30,7 +31,8 @@ struct StoreInfo {
   double fill_value = 0;             ///< of absent bricks; exact for every type
   std::string grid_class;  ///< of the OpenVDB grid that it came from ("level set"), or empty
   std::string grid_name;   ///< of that grid, or empty
-  std::string codec;       ///< "zstd:3" or "none"
+  std::optional<LabelTable> labels;  ///< as VolumeInfo::labels
+  std::string codec;                 ///< "zstd:3" or "none"
   /// Whether level 0 may hold NaN (always false for integers).
   bool may_have_nan = false;
   bool ours = true;                   ///< false: an image that another program has written

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include <isobrick/api.h>
+#include <isobrick/label_properties.h>
 #include <isobrick/scalar.h>
 #include <isobrick/transform.h>
 #include <isobrick/vec.h>
@@ -23,6 +24,9 @@ struct VolumeInfo {
   double fill_value = 0;   ///< what absent bricks hold: the value of empty space
   std::string grid_class;  ///< what OpenVDB calls it: "level set", "fog volume", …; or empty
   std::string grid_name;   ///< of the OpenVDB grid that it is, or empty
+  /// Of a label image: what is known of its labels, of some or of none. Nothing: it is no label
+  /// image, or does not say so.
+  std::optional<LabelTable> labels = {};
   /// All files that it is read from, headers included; none of a volume that is computed or comes
   /// from a stream.
   std::vector<std::filesystem::path> files;

@@ -30,7 +30,7 @@ namespace {
 namespace fs = std::filesystem;
 
 /// Changes when stores that were made of the same input would be others.
-constexpr int kKeyVersion = 1;
+constexpr int kKeyVersion = 2;
 
 /// Whether a store is read in place: its samples and their places stay as they are.
 bool takes_all(const VolumeRequest& request) {
@@ -104,8 +104,9 @@ std::string text_of(const VolumeRequest& r) {
 }
 
 /// What a store is made of.
-std::string key_of(const std::string& path, const VolumeInfo& info, const VolumeRequest& request) {
-  std::string key = fmt::format("{}\n{}", kKeyVersion, text_of(request));
+std::string key_of(const std::string& path, const VolumeInfo& info, const OpenOptions& options) {
+  std::string key = fmt::format("{}\n{}", kKeyVersion, text_of(options.volume));
+  if (options.downsampling) key += fmt::format("downsample {}\n", name_of(*options.downsampling));
   if (fs::is_directory(path) && is_zarr(path))
     return key + identity_of(path) + identity_of_folder(path);
   for (const fs::path& file : info.files) key += identity_of(file);
@@ -189,7 +190,7 @@ struct OpenedVolume::Impl {
   void fill_entry(const std::string& path, VolumeSource& source, const OpenOptions& options,
                   Progress& progress) {
     const fs::path& cache = options.cache.folder;
-    const std::string key = key_of(path, source.info(), options.volume);
+    const std::string key = key_of(path, source.info(), options);
     entry.emplace(cache, volume_stem(path), key, progress);
     if (!entry->is_filled() && !entry->can_be_filled()) {
       entry.reset();
@@ -199,7 +200,7 @@ struct OpenedVolume::Impl {
       entry->clear();
       convert_to(entry->store(), fmt::format("the cache ('{}')", entry->store().string()), path,
                  source, options, progress);
-      if (key_of(path, source.info(), options.volume) != key)
+      if (key_of(path, source.info(), options) != key)
         throw Error(
             fmt::format("'{}' changed while it was converted; run the command again", path));
       entry->set_filled();
@@ -224,6 +225,7 @@ struct OpenedVolume::Impl {
     std::error_code none;
     ConvertOptions convert_options;
     convert_options.memory = options.memory;
+    convert_options.downsampling = options.downsampling;
     convert_options.threads = options.threads;
     convert_options.force = true;  // what a change of the input has left
     convert_options.resume = fs::exists(staging_path(out), none);

@@ -111,7 +111,7 @@ void add_levels(StoreLayout& layout, const ConvertOptions& options) {
     const Int3 factors = factors_of(options, level, layout.factors.size());
     level.lattice.extent = coarser_extent(extent, factors);
     if (level.lattice.extent == extent) break;
-    level.transform = coarser_transform(level.transform, extent, factors, options.downsampling);
+    level.transform = coarser_transform(level.transform, extent, factors, layout.downsampling);
     level.shard = shard_extent(level.lattice, options);
     layout.levels.push_back(level);
     layout.factors.push_back(factors);
@@ -154,6 +154,7 @@ StoreLayout plan_layout(const VolumeInfo& volume, const ConvertOptions& options,
   layout.fill_value = volume.fill_value;
   layout.grid_class = volume.grid_class;
   layout.grid_name = volume.grid_name;
+  layout.labels = volume.labels;
   layout.name = std::filesystem::path(volume.name).filename().string();
   layout.ome = options.ome;
   LevelInfo finest;
@@ -161,7 +162,8 @@ StoreLayout plan_layout(const VolumeInfo& volume, const ConvertOptions& options,
   finest.transform = volume.transform;
   finest.shard = shard_extent(finest.lattice, options);
   layout.levels.push_back(finest);
-  layout.downsampling = options.downsampling;
+  layout.downsampling =
+      options.downsampling.value_or(volume.labels ? Downsampling::mode : Downsampling::mean);
   add_levels(layout, options);
   return layout;
 }

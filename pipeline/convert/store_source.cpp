@@ -27,6 +27,7 @@ class StoreSource final : public VolumeSource {
     info_.fill_value = store_.info().fill_value;
     info_.grid_class = store_.info().grid_class;
     info_.grid_name = store_.info().grid_name;
+    info_.labels = store_.info().labels;
     if (store_.storage()->is_remote()) info_.files.clear();
   }
 

@@ -23,5 +23,8 @@ LabelSmoothing label_smoothing(const LabelOptions& options);
 
 /// Throws UsageError naming the least budget that works when this one does not.
 LabelPlan plan_label_memory(const StoreReader& store, const LabelOptions& options);
+/// The same of samples of a type without a store, which take `source_bytes`.
+LabelPlan plan_label_memory(ScalarType type, std::uint64_t source_bytes,
+                            const LabelOptions& options);
 
 }  // namespace isobrick

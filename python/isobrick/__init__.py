@@ -21,6 +21,7 @@ from ._device import DeviceMesh, DeviceRows
 from ._errors import DamageError, Error, FileError, UsageError
 from ._extract import Extractor, extract
 from ._isobrick import __version__
+from ._labels import extract_labels
 from ._marching_cubes import marching_cubes
 from ._mesh import Measure, Mesh
 from ._open import open
@@ -46,6 +47,7 @@ __all__ = [
     "convert",
     "export",
     "extract",
+    "extract_labels",
     "index",
     "info",
     "marching_cubes",

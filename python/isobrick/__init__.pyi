@@ -226,6 +226,24 @@ class Extractor:
         quantize: bool = False,
     ) -> dict[str, Any]: ...
 
+def extract_labels(
+    array: Any,
+    labels: Union[int, Sequence[int], ArrayLike, None] = None,
+    *,
+    spacing: _Numbers = None,
+    origin: _Numbers = None,
+    direction: _Rotation = None,
+    unit: Optional[str] = None,
+    mask: Optional[ArrayLike] = None,
+    nodata: Optional[float] = None,
+    roi: _Roi = None,
+    background: int = 0,
+    smooth: int = 0,
+    pass_band: float = 0.1,
+    memory: _Bytes = ...,
+    threads: int = 0,
+    progress: _Progress = None,
+) -> dict[int, Mesh]: ...
 @overload
 def extract(
     array: Any,
@@ -397,6 +415,19 @@ class Volume:
         device: int = 0,
         progress: _Progress = None,
     ) -> list[Mesh]: ...
+    def extract_labels(
+        self,
+        labels: Union[int, Sequence[int], ArrayLike, None] = None,
+        *,
+        level: int = 0,
+        roi: _Roi = None,
+        background: int = 0,
+        smooth: int = 0,
+        pass_band: float = 0.1,
+        memory: _Bytes = ...,
+        threads: int = 0,
+        progress: _Progress = None,
+    ) -> dict[int, Mesh]: ...
     def save_mesh(
         self,
         path: _Path,

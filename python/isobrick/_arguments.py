@@ -223,6 +223,28 @@ def extract_options(
     return options
 
 
+def label_options(
+    labels, *, background=0, level=0, box=None, smooth=0, pass_band=0.1, memory=2**30, threads=0,
+):
+    """Which labels get a mesh: None, all but the background; a label, or a list of them."""
+    options = _isobrick.LabelOptions()
+    if labels is not None:
+        chosen = list(labels) if is_list(labels) else [labels]
+        if not chosen:
+            raise UsageError("labels is empty; None stands for all labels")
+        for label in chosen:
+            label = integer(label, "labels", -(2**53), 2**53)
+            options.add_labels(label, label)
+    options.background = integer(background, "background", -(2**53), 2**53)
+    options.level = integer(level, "level", 0, 64)
+    options.roi = box
+    options.smooth = integer(smooth, "smooth", 0, 6)
+    options.pass_band = number(pass_band, "pass_band")
+    options.memory = byte_count(memory)
+    options.threads = thread_count(threads)
+    return options
+
+
 def filter_options(
     *, min_component=0, largest=0, smooth=0, pass_band=0.1, simplify=None, max_error=None,
     measure=False, threads=0,

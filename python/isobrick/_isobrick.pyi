@@ -46,6 +46,17 @@ class ExtractOptions:
     gpu_memory: int
     device: int
 
+class LabelOptions:
+    background: int
+    level: int
+    roi: Optional[tuple[Zyx, Zyx]]
+    smooth: int
+    pass_band: float
+    memory: int
+    threads: int
+    def __init__(self) -> None: ...
+    def add_labels(self, first: int, last: int) -> None: ...
+
 class MeshFilterOptions:
     min_component: int
     largest: int
@@ -169,6 +180,7 @@ class ArrayExtractor:
         self, options: ExtractOptions, filters: MeshFilterOptions, report: Report
     ) -> Mesh: ...
     def extract_to(self, options: ExtractOptions, sink: MeshSink, report: Report) -> None: ...
+    def extract_labels(self, options: LabelOptions, report: Report) -> dict[int, Mesh]: ...
     def surface_bounds(self, options: ExtractOptions) -> tuple[Xyz, Xyz]: ...
     def save(
         self,
@@ -204,6 +216,7 @@ class Store:
         report: Report,
     ) -> list[Mesh]: ...
     def extract_to(self, options: ExtractOptions, sink: MeshSink, report: Report) -> None: ...
+    def extract_labels(self, options: LabelOptions, report: Report) -> dict[int, Mesh]: ...
     def surface_bounds(self, options: ExtractOptions) -> tuple[Xyz, Xyz]: ...
     def save_mesh(
         self,

@@ -226,6 +226,11 @@ class Mesh:
         return meshio.Mesh(self.vertices, [("triangle", self.faces)], point_data=data)
 
 
+def meshes_of(natives):
+    """The same dictionary of meshes of the C++ layer."""
+    return {label: Mesh._of(native) for label, native in natives.items()}
+
+
 def with_measure(report):
     """What a file was made of, with a `Measure` where one was requested."""
     return {**report, "measure": Measure(**report["measure"])} if "measure" in report else report

@@ -14,7 +14,7 @@ __all__ = ["convert", "export", "index", "info", "synth", "verify"]
 
 
 def _convert_options(
-    *, brick=None, shard=None, compression=3, levels=None, ome="0.5", downsampling="mean",
+    *, brick=None, shard=None, compression=3, levels=None, ome="0.5", downsampling=None,
     index=None, leaf=16, resume=False, force=False, memory=2**30, threads=0,
 ):
     options = _isobrick.ConvertOptions()
@@ -27,7 +27,7 @@ def _convert_options(
     if str(ome) not in ("0.4", "0.5"):
         raise UsageError(f"ome must be '0.4' or '0.5', not {ome!r}")
     options.ome_04 = str(ome) == "0.4"
-    if not options.set_downsampling(str(downsampling)):
+    if downsampling is not None and not options.set_downsampling(str(downsampling)):
         raise UsageError(
             f"downsampling must be mean, max, min, mode or stride, not {downsampling!r}"
         )
@@ -72,7 +72,7 @@ def convert(source, path, *, progress=None, **options):
     levels : int
         Resolutions; by default until one brick holds the coarsest.
     downsampling : "mean", "max", "min", "mode" or "stride"
-        How a level is made from the finer one; labels need "mode".
+        How a level is made from the finer one. By default by the mean, of a label image by the mode.
     ome : "0.5" or "0.4"
         Version of OME-Zarr.
     index, leaf

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from ._arguments import (
-    box_of, extract_options, filter_options, histogram_bins, integer, is_list, mesh_file_options,
-    number, one_isovalue, path_text, thread_count,
+    box_of, extract_options, filter_options, histogram_bins, integer, is_list, label_options,
+    mesh_file_options, number, one_isovalue, path_text, thread_count,
 )
 from ._errors import UsageError
 from ._indexing import read_indexed
-from ._mesh import Mesh, with_measure
+from ._mesh import Mesh, meshes_of, with_measure
 from ._progress import reporting
 
 
@@ -233,6 +233,22 @@ class Volume:
         options = self._surface(isovalue, **request)
         with reporting(progress) as report:
             return Mesh._of(self._native.extract(options, filters, report))
+
+    def extract_labels(
+        self, labels=None, *, level=0, roi=None, background=0, smooth=0, pass_band=0.1,
+        memory=2**30, threads=0, progress=None,
+    ):
+        """The meshes of labels: a dictionary from labels to `Mesh`. See `isobrick.extract_labels`.
+
+        All meshes are in memory; `isobrick extract --labels` streams them to files.
+        """
+        options = label_options(
+            labels, background=background, level=level,
+            box=box_of(roi, self._level(level).shape), smooth=smooth, pass_band=pass_band,
+            memory=memory, threads=threads,
+        )
+        with reporting(progress) as report:
+            return meshes_of(self._native.extract_labels(options, report))
 
     def _extract_several(self, isovalues, request, filters):
         isovalues = [self.isovalue(one, progress=request["progress"]) for one in isovalues]

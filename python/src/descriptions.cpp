@@ -27,6 +27,22 @@ py::dict describe_level(const LevelInfo& level) {
 
 }  // namespace
 
+/// {label: {"name": …, "colour": …}}, None of what is no label image.
+py::object describe(const std::optional<LabelTable>& labels) {
+  if (!labels) return py::none();
+  py::dict table;
+  for (const LabelProperties& properties : *labels) {
+    py::dict entry;
+    if (!properties.name.empty()) entry["name"] = properties.name;
+    if (properties.colour) {
+      const auto& c = *properties.colour;
+      entry["colour"] = py::make_tuple(c[0], c[1], c[2], c[3]);
+    }
+    table[py::int_(properties.label)] = entry;
+  }
+  return table;
+}
+
 py::dict describe(const StoreInfo& info) {
   py::list levels;
   for (const LevelInfo& level : info.levels) levels.append(describe_level(level));
@@ -40,6 +56,7 @@ py::dict describe(const StoreInfo& info) {
   dict["fill_value"] = info.fill_value;
   dict["grid_class"] = info.grid_class;
   dict["grid_name"] = info.grid_name;
+  dict["labels"] = describe(info.labels);
   dict["is_store"] = info.ours;
   return dict;
 }
@@ -55,6 +72,7 @@ py::dict describe(const VolumeInfo& info) {
   dict["fill_value"] = info.fill_value;
   dict["grid_class"] = info.grid_class;
   dict["grid_name"] = info.grid_name;
+  dict["labels"] = describe(info.labels);
   dict["is_store"] = false;
   return dict;
 }

@@ -17,6 +17,7 @@
 #include "python/src/filtered.h"
 #include "python/src/interruptible.h"
 #include "python/src/isovalues.h"
+#include "python/src/labels.h"
 #include "python/src/sample_array.h"
 #include "python/src/surface_bounds.h"
 
@@ -27,10 +28,7 @@ namespace {
 class ArrayExtractor {
  public:
   ArrayExtractor(const Volume& volume, py::object samples, py::object mask)
-      : samples_(std::move(samples)),
-        mask_(std::move(mask)),
-        type_(volume.type),
-        extractor_(volume) {}
+      : samples_(std::move(samples)), mask_(std::move(mask)), volume_(volume), extractor_(volume) {}
 
   std::unique_ptr<Mesh> extract(ExtractOptions options, const MeshFilterOptions& filters,
                                 const py::object& callback) {
@@ -56,6 +54,14 @@ class ArrayExtractor {
       CancellableSink cancellable(sink, reporter.cancel);
       extractor_.extract(options, cancellable, reporter.progress);
     });
+  }
+
+  py::dict extract_labels(const LabelOptions& options, const py::object& callback) {
+    return label_meshes(options, callback,
+                        [&](const LabelOptions& o, const LabelVisitor& visit, Progress& progress) {
+                          const std::lock_guard lock(mutex_);
+                          isobrick::extract_labels(volume_, o, visit, progress);
+                        });
   }
 
   std::pair<Vec3d, Vec3d> bounds(ExtractOptions options) {
@@ -86,7 +92,7 @@ class ArrayExtractor {
   std::vector<double> isovalues(const std::string& text, int threads, const py::object& callback) {
     return interruptible(callback, [&](Reporter reporter) {
       const std::lock_guard lock(mutex_);
-      return resolve_isovalues(parse_isovalues(text), type_,
+      return resolve_isovalues(parse_isovalues(text), volume_.type,
                                [&] { return counted(threads, reporter.progress); });
     });
   }
@@ -94,7 +100,7 @@ class ArrayExtractor {
   Suggestion suggested_isovalue(int threads, const py::object& callback) {
     return pair_of(interruptible(callback, [&](Reporter reporter) {
       const std::lock_guard lock(mutex_);
-      return suggest_isovalue(type_, counted(threads, reporter.progress));
+      return suggest_isovalue(volume_.type, counted(threads, reporter.progress));
     }));
   }
 
@@ -120,7 +126,7 @@ class ArrayExtractor {
   }
 
   py::object samples_, mask_;
-  ScalarType type_;   ///< of the samples
+  Volume volume_;
   std::mutex mutex_;  ///< one operation at a time
   VolumeExtractor extractor_;
   std::optional<Histogram> histogram_;  ///< of all samples, once they were counted
@@ -151,6 +157,7 @@ void bind_extractor(py::module_& module) {
       .def_static("of_function", &of_function)
       .def("extract", &ArrayExtractor::extract)
       .def("extract_to", &ArrayExtractor::extract_to)
+      .def("extract_labels", &ArrayExtractor::extract_labels)
       .def("surface_bounds", &ArrayExtractor::bounds)
       .def("save", &ArrayExtractor::save)
       .def("isovalues", &ArrayExtractor::isovalues)

@@ -3,6 +3,7 @@
 #include <string>
 
 #include <isobrick/extract.h>
+#include <isobrick/labels.h>
 #include <isobrick/mesh_file_sink.h>
 #include <isobrick/mesh_filters.h>
 #include <isobrick/transform.h>
@@ -55,6 +56,22 @@ void bind_extract_options(py::module_& module) {
       .def_readwrite("backend", &ExtractOptions::backend)
       .def_readwrite("gpu_memory", &ExtractOptions::gpu_memory)
       .def_readwrite("device", &ExtractOptions::device);
+}
+
+void bind_label_options(py::module_& module) {
+  py::class_<LabelOptions>(module, "LabelOptions")
+      .def(py::init<>())
+      .def("add_labels",
+           [](LabelOptions& o, std::int64_t first, std::int64_t last) {
+             o.labels.push_back({first, last});
+           })
+      .def_readwrite("background", &LabelOptions::background)
+      .def_readwrite("level", &LabelOptions::level)
+      .def_readwrite("roi", &LabelOptions::roi)
+      .def_readwrite("smooth", &LabelOptions::smooth)
+      .def_readwrite("pass_band", &LabelOptions::pass_band)
+      .def_readwrite("memory", &LabelOptions::memory)
+      .def_readwrite("threads", &LabelOptions::threads);
 }
 
 void bind_mesh_filter_options(py::module_& module) {
@@ -116,6 +133,7 @@ void bind_volume_request(py::module_& module) {
 void bind_options(py::module_& module) {
   bind_transform(module);
   bind_extract_options(module);
+  bind_label_options(module);
   bind_mesh_filter_options(module);
   bind_mesh_file_options(module);
   bind_volume_request(module);

@@ -26,6 +26,7 @@
 #include "python/src/filtered.h"
 #include "python/src/interruptible.h"
 #include "python/src/isovalues.h"
+#include "python/src/labels.h"
 #include "python/src/surface_bounds.h"
 
 namespace isobrick::python {
@@ -77,6 +78,14 @@ std::vector<std::unique_ptr<Mesh>> extract_meshes(const OpenedVolume& volume,
 std::unique_ptr<Mesh> extract_mesh(const OpenedVolume& volume, const ExtractOptions& options,
                                    const MeshFilterOptions& filters, const py::object& callback) {
   return std::move(extract_meshes(volume, options, filters, {options.isovalue}, callback).front());
+}
+
+py::dict extract_labels_of(const OpenedVolume& volume, const LabelOptions& options,
+                           const py::object& callback) {
+  return label_meshes(options, callback,
+                      [&](const LabelOptions& o, const LabelVisitor& visit, Progress& progress) {
+                        extract_labels(volume.store(), o, visit, progress);
+                      });
 }
 
 void extract_to(const OpenedVolume& volume, ExtractOptions options, MeshSink& sink,
@@ -219,6 +228,7 @@ void bind_store(py::module_& module) {
       .def("extract", &extract_mesh)
       .def("extract_several", &extract_meshes)
       .def("extract_to", &extract_to)
+      .def("extract_labels", &extract_labels_of)
       .def("surface_bounds", &bounds_of_surface)
       .def("save_mesh", &save_mesh)
       .def("estimate", &estimate_mesh)

@@ -37,7 +37,9 @@ class Labels : public ::testing::Test {
     return StoreReader(path);
   }
 
-  static Meshes meshes_of(const StoreReader& store, const LabelOptions& options = {},
+  /// Of a store, or of a Volume.
+  template <class Samples>
+  static Meshes meshes_of(const Samples& store, const LabelOptions& options = {},
                           LabelReport* report = nullptr) {
     Meshes meshes;
     std::mutex mutex;
@@ -325,6 +327,33 @@ TEST_F(Labels, EverySampleTypeGivesTheSameMeshes) {
   EXPECT_EQ(meshes_of(store(cells<std::uint32_t>(extent, 20, 6))), expected);
   EXPECT_EQ(meshes_of(store(cells<float>(extent, 20, 6))), expected);
   EXPECT_EQ(meshes_of(store(cells<double>(extent, 20, 6))), expected);
+}
+
+TEST_F(Labels, ArraysAndFunctionsGiveTheMeshesOfAStore) {
+  const Field<std::uint16_t> field = cells<std::uint16_t>({70, 45, 40}, 20, 14);
+  const Meshes expected = meshes_of(store(field), {.smooth = 2});
+  Volume array = Volume::of(field.samples.data(), field.extent);
+  EXPECT_EQ(meshes_of(array, {.smooth = 2, .threads = 2}), expected);
+  Volume function{.type = ScalarType::u16, .extent = field.extent};
+  function.read = [&](Box3 box, void* out) {
+    auto* samples = static_cast<std::uint16_t*>(out);
+    for_each_point(box, [&](Int3 p) { *samples++ = field.at(p); });
+  };
+  EXPECT_EQ(meshes_of(function, {.smooth = 2}), expected);
+  function.concurrent_reads = true;
+  EXPECT_EQ(meshes_of(function, {.smooth = 2, .threads = 3}), expected);
+  // The samples from the last to the first are the volume in the mirror.
+  array.samples = &field.samples.back();
+  array.strides = {-2, -2 * field.extent.x, -2 * field.extent.x * field.extent.y};
+  const Meshes mirrored = meshes_of(array);
+  ASSERT_EQ(mirrored.size(), expected.size());
+  for (const auto& [label, mesh] : mirrored) {
+    EXPECT_EQ(mesh.triangles.size(), expected.at(label).triangles.size());
+    EXPECT_GT(enclosed_volume(mesh), 0);
+  }
+  array.nodata = 7;
+  EXPECT_EQ(meshes_of(array).count(7), 0u);
+  EXPECT_THROW(meshes_of(array, {.level = 1}), UsageError);
 }
 
 TEST_F(Labels, SinksOfUnweldedChunksGetTheSameTriangles) {

@@ -104,6 +104,75 @@ TEST_F(LabelOption, TakesAnyInput) {
   EXPECT_LT(region["labels"].get<int>(), 30);
 }
 
+TEST_F(LabelOption, NamesAndColoursAreThoseOfTheImage) {
+  const std::string segments =
+      "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 8 8 8\nencoding: raw\n"
+      "Segment0_ID:=Segment_1\nSegment0_Name:=left kidney\nSegment0_LabelValue:=3\n"
+      "Segment0_Color:=0.5 0 1\n"
+      "Segment1_ID:=Segment_2\nSegment1_Name:=spleen\nSegment1_LabelValue:=2\n"
+      "Segment1_Color:=x\n"
+      "Segment2_ID:=Segment_3\nSegment2_LabelValue:=none\n\n";
+  write_file(path("seg.nrrd"), segments + std::string(256, '\x03') + std::string(256, '\x02'));
+  const nlohmann::json expected = nlohmann::json::parse(
+      R"([{"label":2,"name":"spleen"},{"label":3,"name":"left kidney","colour":[128,0,255,255]}])");
+  EXPECT_EQ(run_json({"info", path("seg.nrrd")})["labels"], expected);
+  run_json({"convert", path("seg.nrrd"), path("seg.zarr"), "--brick", "16"});
+  run_json({"convert", path("seg.zarr"), path("again.zarr"), "--ome", "0.4"});
+  for (const char* name : {"seg.zarr", "again.zarr", "seg.nrrd"}) {
+    EXPECT_EQ(run_json({"info", path(name)})["labels"], expected) << name;
+    run_json({"extract", path(name), "--labels", "all", "-o", path("meshes"), "--force"});
+    const nlohmann::json labels = list("meshes")["labels"];
+    ASSERT_EQ(labels.size(), 2u);
+    EXPECT_EQ(labels[0]["name"], "spleen");
+    EXPECT_EQ(labels[1]["name"], "left kidney");
+    EXPECT_EQ(labels[1]["colour"], expected[1]["colour"]);
+  }
+  EXPECT_TRUE(run_json({"info", make_store("a")})["labels"].is_null());
+  EXPECT_EQ(run_json({"info", store_})["labels"], nlohmann::json::array());
+}
+
+TEST_F(LabelOption, CoarserLevelsOfLabelImagesHaveLabels) {
+  const Outcome made = run(
+      {"synth", "cells", path("b.zarr"), "--dims", "60,50,40", "--type", "u8", "--brick", "16"});
+  ASSERT_EQ(made.exit_code, 0) << made.err;
+  EXPECT_EQ(read_file(path("b.zarr/1/zarr.json")), read_file(store_ + "/1/zarr.json"));
+  EXPECT_NE(read_file(path("b.zarr/zarr.json")).find("\"mode\""), std::string::npos);
+  // What the cache makes for labels is not what it makes for isosurfaces.
+  write_file(path("a_80x80x80_uint8.raw"), noise(80 * 80 * 80));
+  for (const char* order : {"first", "second"}) {
+    const Outcome surface =
+        run({"extract", path("a_80x80x80_uint8.raw"), "--isovalue", "127.5", "--level", "1", "-o",
+             path(std::string(order) + ".ply"), "--cache", path("cache")});
+    EXPECT_EQ(surface.exit_code, 0) << surface.err;
+    run_json({"extract", path("a_80x80x80_uint8.raw"), "--labels", "1", "--level", "0", "-o",
+              path(order), "--cache", path("cache")});
+  }
+  EXPECT_EQ(read_file(path("first.ply")), read_file(path("second.ply")));
+}
+
+TEST_F(LabelOption, LabelImagesInAGroupAreListed) {
+  fs::create_directories(path("scan.zarr/labels"));
+  run_json({"convert", store_, path("scan.zarr/labels/cells"), "--brick", "16"});
+  const Outcome made =
+      run({"synth", "sphere", path("image.zarr"), "--dims", "60,50,40", "--type", "u8"});
+  ASSERT_EQ(made.exit_code, 0) << made.err;
+  fs::copy(path("image.zarr"), path("scan.zarr"), fs::copy_options::recursive);
+  EXPECT_TRUE(run_json({"info", path("scan.zarr")})["label_images"].empty());
+  write_file(path("scan.zarr/labels/zarr.json"),
+             R"({"zarr_format":3,"node_type":"group","attributes":{"ome":{"version":"0.5",
+                 "labels":["cells"]}}})");
+  EXPECT_EQ(run_json({"info", path("scan.zarr")})["label_images"],
+            nlohmann::json::parse(R"(["cells"])"));
+  EXPECT_EQ(run_json({"extract", path("scan.zarr/labels/cells"), "--labels", "7", "-o",
+                      path("meshes")})["labels"],
+            1);
+  fs::remove(path("scan.zarr/labels/zarr.json"));
+  write_file(path("scan.zarr/labels/.zattrs"), R"({"labels": ["cells"]})");
+  EXPECT_EQ(run_json({"info", path("scan.zarr")})["label_images"].size(), 1u);
+  write_file(path("scan.zarr/labels/.zattrs"), R"({"labels": 3})");
+  expect_refused(run({"info", path("scan.zarr")}), 1, {"labels/.zattrs"});
+}
+
 TEST_F(LabelOption, ReplacesOnlyItsOwnFolder) {
   extract({"--labels", "7", "-o", path("out")});
   const Arguments again{"extract", store_, "--labels", "8", "-o", path("out")};

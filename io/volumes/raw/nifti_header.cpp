@@ -45,7 +45,7 @@ struct Numbers {
   double pixdim[8];
   int type = 0;
   double offset = 0, slope = 0, intercept = 0;
-  int units = 0, qform = 0, sform = 0;
+  int units = 0, qform = 0, sform = 0, intent = 0;
   double quaternion[3], qoffset[3], srow[12];
 };
 
@@ -80,6 +80,7 @@ Numbers read_version_1(const Fields& fields) {
                                        40, 76, 70, 112, 116, 252, 254, 256, 268, 280});
   n.offset = fields.at<float>(108);
   n.units = fields.at<std::uint8_t>(123);
+  n.intent = fields.at<std::int16_t>(68);
   return n;
 }
 
@@ -88,6 +89,7 @@ Numbers read_version_2(const Fields& fields) {
                                        16, 104, 12, 176, 184, 344, 348, 352, 376, 400});
   n.offset = static_cast<double>(fields.at<std::int64_t>(168));
   n.units = fields.at<std::int32_t>(500);
+  n.intent = fields.at<std::int32_t>(504);
   return n;
 }
 
@@ -240,6 +242,8 @@ NiftiHeader parse_nifti_header(const std::string& path, std::span<const std::byt
   header.detached = version.detached;
   header.offset = read_offset(path, n, version);
   header.scale = read_scale(path, n);
+  constexpr int kLabelIntent = 1002;
+  header.is_label_image = n.intent == kLabelIntent;
   header.transform = read_transform(path, n);
   return header;
 }

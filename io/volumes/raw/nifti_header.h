@@ -19,7 +19,8 @@ struct NiftiHeader {
   bool detached = false;             ///< the samples lie in a file of their own (.hdr and .img)
   std::uint64_t offset = 0;          ///< of the first sample of the array
   ValueScale scale;
-  Transform transform;  ///< to the space of sform, else of qform, else of the spacing alone
+  bool is_label_image = false;  ///< its intent is NIFTI_INTENT_LABEL
+  Transform transform;          ///< to the space of sform, else of qform, else of the spacing alone
 };
 
 /// Bytes of the longer one of both headers, NIfTI-2's.

@@ -100,6 +100,7 @@ std::unique_ptr<VolumeSource> open_nifti(const std::string& path, const VolumeRe
   layout.info =
       describe_volume(data_path, header.view.extent, header.type, header.transform, request);
   layout.info.files = {path, data_path};
+  if (header.is_label_image) layout.info.labels.emplace();
   layout.offset = header.offset + static_cast<std::uint64_t>(header.view.first) * sample;
   layout.swap = header.swap && sample > 1;
   layout.stride = header.view.stride;

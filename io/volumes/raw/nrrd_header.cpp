@@ -340,6 +340,21 @@ std::string read_unit(const Fields& fields, const std::string& name, std::size_t
   return shared ? first : std::string();
 }
 
+/// "0.5 0.68 0.45": red, green and blue from 0 to 1.
+std::optional<std::array<std::uint8_t, 4>> parse_segment_colour(const std::string& text) {
+  std::array<std::uint8_t, 4> colour{0, 0, 0, 255};
+  const auto words = split_words(text);
+  if (words.size() != 3) return std::nullopt;
+  for (std::size_t i = 0; i < 3; ++i) {
+    double part = 0;
+    const auto [end, error] =
+        std::from_chars(words[i].data(), words[i].data() + words[i].size(), part);
+    if (error != std::errc{} || !(part >= 0 && part <= 1)) return std::nullopt;
+    colour[i] = static_cast<std::uint8_t>(std::lround(part * 255));
+  }
+  return colour;
+}
+
 /// What export keeps of a grid in key/value pairs.
 void read_grid(const Fields& fields, TextHeader& header) {
   constexpr std::size_t kMaxClass = 100, kMaxName = 1000;
@@ -353,6 +368,29 @@ void read_grid(const Fields& fields, TextHeader& header) {
     header_error(fields.path(), fmt::format("'{}': '{}' is no {}", kNrrdFillValue,
                                             printable(fill, 60), short_name(header.type)));
   header.fill_value = value;
+}
+
+/// The segments of 3D Slicer, in key/value pairs such as Segment0_LabelValue.
+void read_segments(const Fields& fields, TextHeader& header) {
+  constexpr std::size_t kMaxName = 1000;
+  for (int i = 0;; ++i) {
+    const auto pair = [&](const char* key) {
+      return fields.pair(fmt::format("Segment{}_{}", i, key));
+    };
+    if (pair("ID").empty()) break;
+    if (!header.labels) header.labels.emplace();
+    const std::string value = pair("LabelValue");
+    LabelProperties segment;
+    const auto [end, error] =
+        std::from_chars(value.data(), value.data() + value.size(), segment.label);
+    if (error != std::errc{} || end != value.data() + value.size() || value.empty()) continue;
+    segment.name = printable(pair("Name"), kMaxName);
+    segment.colour = parse_segment_colour(pair("Color"));
+    header.labels->push_back(std::move(segment));
+  }
+  if (!header.labels) return;
+  std::stable_sort(header.labels->begin(), header.labels->end(),
+                   [](const auto& a, const auto& b) { return a.label < b.label; });
 }
 
 }  // namespace
@@ -370,6 +408,7 @@ TextHeader parse_nrrd_header(const std::string& path, const Selection& selection
   if (header.transform.unit.empty())
     header.transform.unit = read_unit(fields, "units", dimension, header.view.kept);
   read_grid(fields, header);
+  read_segments(fields, header);
   return header;
 }
 

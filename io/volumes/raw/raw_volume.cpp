@@ -130,6 +130,7 @@ void check_size(const TextHeader& header, DescribedBy by, const VolumeInfo& info
 void take_grid(const TextHeader& header, VolumeInfo& info) {
   info.grid_class = header.grid_class;
   info.grid_name = header.grid_name;
+  info.labels = header.labels;
   if (header.fill_value && info.type == header.type) info.fill_value = *header.fill_value;
 }
 

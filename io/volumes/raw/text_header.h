@@ -32,6 +32,7 @@ struct TextHeader {
   Transform transform;
   std::string grid_class, grid_name;  ///< as VolumeInfo has them
   std::optional<double> fill_value;
+  std::optional<LabelTable> labels;  ///< as VolumeInfo has them
 
   bool attached() const { return data_paths.front() == path; }
 };

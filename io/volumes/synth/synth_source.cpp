@@ -52,6 +52,7 @@ class SynthSource final : public VolumeSource {
     info_.extent = options.extent;
     info_.type = options.type;
     info_.name = name_of(options.kind);
+    if (options.kind == SynthKind::cells) info_.labels.emplace();
   }
 
   const VolumeInfo& info() const override { return info_; }

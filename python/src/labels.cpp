@@ -1,0 +1,35 @@
+#include "python/src/labels.h"
+
+#include <map>
+#include <memory>
+#include <mutex>
+#include <utility>
+
+#include <isobrick/mesh_sinks.h>
+#include "python/src/interruptible.h"
+
+namespace isobrick::python {
+
+py::dict label_meshes(LabelOptions options, const py::object& callback,
+                      const ExtractLabels& extract) {
+  std::map<std::int64_t, std::unique_ptr<Mesh>> meshes;
+  run_interruptibly(callback, [&](Reporter reporter) {
+    options.cancel = reporter.cancel;
+    std::mutex mutex;
+    extract(
+        options,
+        [&](const LabelMesh& label) {
+          auto mesh = std::make_unique<Mesh>();
+          MemorySink sink(*mesh);
+          label.write(sink);
+          const std::lock_guard lock(mutex);
+          meshes.emplace(label.label(), std::move(mesh));
+        },
+        reporter.progress);
+  });
+  py::dict result;
+  for (auto& [label, mesh] : meshes) result[py::int_(label)] = py::cast(std::move(mesh));
+  return result;
+}
+
+}  // namespace isobrick::python

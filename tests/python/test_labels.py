@@ -1,0 +1,96 @@
+"""Meshes of labels."""
+
+import numpy as np
+import pytest
+
+import isobrick
+
+
+@pytest.fixture(scope="module")
+def cells():
+    return isobrick.synth("cells", shape=(40, 45, 50), dtype="uint16")
+
+
+def volume_of(mesh):
+    a, b, c = (mesh.vertices[mesh.faces[:, i]].astype("f8") for i in range(3))
+    return np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6
+
+
+def same(a, b):
+    return np.array_equal(a.vertices, b.vertices) and np.array_equal(a.faces, b.faces)
+
+
+def test_each_label_has_a_closed_mesh(cells):
+    meshes = isobrick.extract_labels(cells)
+    assert list(meshes) == sorted(set(np.unique(cells)) - {0})
+    for label, mesh in meshes.items():
+        sides = np.concatenate([mesh.faces[:, [i, (i + 1) % 3]] for i in range(3)])
+        forward = set(map(tuple, sides.tolist()))
+        assert len(forward) == len(sides)
+        assert forward == {(b, a) for a, b in forward}
+        count = np.count_nonzero(cells == label)
+        assert volume_of(mesh) == pytest.approx(count, rel=0.5, abs=3)
+        # In the cells around its samples, in x, y, z.
+        inside = np.argwhere(cells == label)[:, ::-1]
+        assert (mesh.vertices.min(axis=0) > inside.min(axis=0) - 1).all()
+        assert (mesh.vertices.max(axis=0) < inside.max(axis=0) + 1).all()
+
+
+def test_arrays_of_every_kind_give_the_same(cells, tmp_path):
+    expected = isobrick.extract_labels(cells, smooth=2)
+    for array in (
+        cells.astype("int64"), cells.astype("uint64"), cells.astype("float64"),
+        np.asfortranarray(cells), cells.astype("int32")[::-1][::-1],
+    ):
+        meshes = isobrick.extract_labels(array, smooth=2)
+        assert list(meshes) == list(expected)
+        assert all(same(meshes[label], expected[label]) for label in expected)
+    path = tmp_path / "cells.zarr"
+    isobrick.convert(cells, path, brick=16, downsampling="mode")
+    volume = isobrick.open(path)
+    for meshes in (volume.extract_labels(smooth=2), isobrick.extract_labels(volume, smooth=2)):
+        assert all(same(meshes[label], expected[label]) for label in expected)
+
+
+def test_lazy_arrays_are_read_by_blocks(cells):
+    dask = pytest.importorskip("dask.array")
+    expected = isobrick.extract_labels(cells, [3, 7])
+    meshes = isobrick.extract_labels(dask.from_array(cells, chunks=16), [3, 7])
+    assert all(same(meshes[label], expected[label]) for label in (3, 7))
+
+
+def test_choices(cells):
+    everything = isobrick.extract_labels(cells)
+    assert list(isobrick.extract_labels(cells, 7)) == [7]
+    assert list(isobrick.extract_labels(cells, np.array([9, 7]))) == [7, 9]
+    assert same(isobrick.extract_labels(cells, 7)[7], everything[7])
+    assert 0 in isobrick.extract_labels(cells, background=7)
+    assert 7 not in isobrick.extract_labels(cells, background=7)
+    part = isobrick.extract_labels(cells, roi=np.s_[:10, :10, :10])
+    assert 0 < len(part) < len(everything)
+    scaled = isobrick.extract_labels(cells, 7, spacing=(1, 2, 3), unit="um")[7]
+    assert scaled.unit == "micrometer"
+    assert np.allclose(scaled.vertices, everything[7].vertices * (1, 2, 3))
+
+
+def test_what_makes_no_sense_is_refused(cells):
+    for labels, error in (
+        (999, ValueError), ([], ValueError), (2**60, ValueError), ([1.5], TypeError),
+        ("all", TypeError),
+    ):
+        with pytest.raises(error):
+            isobrick.extract_labels(cells, labels)
+    with pytest.raises(ValueError, match="smooth"):
+        isobrick.extract_labels(cells, smooth=7)
+    with pytest.raises(isobrick.Error, match="no label image"):
+        isobrick.extract_labels(cells + np.float32(0.5))
+    with pytest.raises(ValueError, match="2..53"):
+        isobrick.extract_labels(np.full((4, 4, 4), 2**60 + 1))
+
+
+def test_label_images_are_known(tmp_path):
+    path = tmp_path / "cells.zarr"
+    isobrick.synth("cells", path, shape=(40, 40, 40), dtype="uint8")
+    assert isobrick.info(path)["labels"] == {}
+    isobrick.synth("sphere", tmp_path / "ball.zarr", shape=(40, 40, 40))
+    assert isobrick.info(tmp_path / "ball.zarr")["labels"] is None
