@@ -120,7 +120,13 @@ VisitPlan plan_visits(const ExtractArguments& arguments, const MeshFilterOptions
 class LabelWriter {
  public:
   LabelWriter(const ExtractArguments& arguments, const StoreReader& store, fs::path folder)
-      : arguments_(arguments), store_(store), folder_(std::move(folder)) {
+      : arguments_(arguments),
+        store_(store),
+        folder_(std::move(folder)),
+        list_((folder_ / kListName).string(), false) {
+    list_.writer().append(
+        fmt::format("{{\"schema\": {}, \"input\": {}, \"level\": {}, \"labels\": [", kJsonSchema,
+                    ordered_json(store.info().name).dump(), *arguments.level));
     filter_ = filter_options(arguments.filters);
     filter_.smooth = 0;  // all meshes are smoothed together, before
     plan_ = plan_visits(arguments, filter_);
@@ -159,31 +165,31 @@ class LabelWriter {
     written_.vertices += size.vertices;
     written_.triangles += size.triangles;
     bytes_ += sink->bytes();
-    entries_.emplace(mesh.label(), entry.dump());
+    entries_.emplace(mesh.index(), entry.dump());
+    write_entries();
   }
 
-  /// Writes the list, in the order of the labels.
-  void write_list() {
-    OutputFile file((folder_ / kListName).string(), false);
-    FileWriter& out = file.writer();
-    out.append(fmt::format("{{\"schema\": {}, \"input\": {}, \"level\": {}, \"labels\": [",
-                           kJsonSchema, ordered_json(store_.info().name).dump(),
-                           *arguments_.level));
-    const char* before = "\n";
-    for (const auto& [label, entry] : entries_) {
-      out.append(before);
-      out.append(entry);
-      before = ",\n";
-    }
+  /// Ends the list.
+  void finish() {
+    FileWriter& out = list_.writer();
     out.append("\n]}\n");
     bytes_ += out.size();
-    file.publish();
+    list_.publish();
   }
 
   MeshSize written() const { return written_; }
   std::uint64_t bytes() const { return bytes_; }
 
  private:
+  /// Writes those that come next, in the order of the labels.
+  void write_entries() {
+    while (!entries_.empty() && entries_.begin()->first == entries_written_) {
+      list_.writer().append(entries_written_++ > 0 ? ",\n" : "\n");
+      list_.writer().append(entries_.begin()->second);
+      entries_.erase(entries_.begin());
+    }
+  }
+
   /// What the image says of a label; null: nothing.
   const LabelProperties* find_properties(std::int64_t label) const {
     if (!store_.info().labels) return nullptr;
@@ -200,7 +206,9 @@ class LabelWriter {
   MeshFilterOptions filter_;
   VisitPlan plan_;
   std::mutex mutex_;
-  std::map<std::int64_t, std::string> entries_;
+  OutputFile list_;
+  std::map<std::uint64_t, std::string> entries_;  ///< that wait for those before them
+  std::uint64_t entries_written_ = 0;
   MeshSize written_;
   std::uint64_t bytes_ = 0;
 };
@@ -263,7 +271,7 @@ int run_extract_labels(const ExtractArguments& given, Console& console) {
   options.scratch_beside = folder.folder();
   const LabelReport report = extract_labels(
       store, options, [&](const LabelMesh& mesh) { writer.write(mesh); }, console.progress());
-  writer.write_list();
+  writer.finish();
   folder.publish();
   if (report.labels == 0)
     console.note("there is no label but the background 0, so the folder has no mesh");

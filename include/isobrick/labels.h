@@ -49,7 +49,9 @@ class ISOBRICK_API LabelMesh {
   virtual ~LabelMesh() = default;
 
   virtual std::int64_t label() const = 0;  ///< the samples' value
-  virtual MeshSize size() const = 0;       ///< vertices and triangles
+  /// Its place among all meshes in the order of the labels, the first is 0.
+  virtual std::uint64_t index() const = 0;
+  virtual MeshSize size() const = 0;  ///< vertices and triangles
   /// Passes the mesh to a sink (begin … finish), each time the same.
   virtual void write(MeshSink& sink) const = 0;
 };

@@ -13,21 +13,24 @@ namespace isobrick::inline v0 {
 class SpooledLabelMesh final : public LabelMesh {
  public:
   /// All but `chain` must outlive it. `header` is what sinks hear before the first chunk.
-  SpooledLabelMesh(const LabelSpool& spool, const LabelChain& chain, const Transform& transform,
-                   MeshHeader header, std::stop_token cancel)
+  SpooledLabelMesh(const LabelSpool& spool, const LabelChain& chain, std::uint64_t index,
+                   const Transform& transform, MeshHeader header, std::stop_token cancel)
       : spool_(spool),
         chain_(chain),
+        index_(index),
         transform_(transform),
         header_(std::move(header)),
         cancel_(std::move(cancel)) {}
 
   std::int64_t label() const override { return chain_.label; }
+  std::uint64_t index() const override { return index_; }
   MeshSize size() const override { return {chain_.vertices, 2 * chain_.quads}; }
   void write(MeshSink& sink) const override;
 
  private:
   const LabelSpool& spool_;
   LabelChain chain_;
+  std::uint64_t index_;
   const Transform& transform_;
   MeshHeader header_;
   std::stop_token cancel_;

@@ -123,7 +123,7 @@ void LabelPass::pass_on(const std::vector<LabelChain>& chains, const LabelVisito
         return i < chains.size();
       },
       [&](std::size_t& i) {
-        visit(SpooledLabelMesh(spool_, chains[i], volume_.transform, header_of(chains[i]),
+        visit(SpooledLabelMesh(spool_, chains[i], i, volume_.transform, header_of(chains[i]),
                                options_.cancel));
       },
       [&](std::size_t& i) { progress_.advance(2 * chains[i].quads * sizeof(Triangle)); });

@@ -51,6 +51,22 @@ constexpr std::uint64_t bits_between(int lo, int hi) {
   return hi <= lo ? 0 : (std::uint64_t{1} << hi) - (std::uint64_t{1} << lo);
 }
 
+/// The faces of a cell whose corners have three labels or more, as bits.
+template <class Id>
+int junctions_of(const std::array<Id, 8>& ids) {
+  int junctions = 0;
+  for (int face = 0; face < 6; ++face) {
+    const auto id = [&](int i) {
+      return ids[static_cast<std::size_t>(case_rule::kFaces[face][i % 4])];
+    };
+    int changes = 0;  // around the face; two labels change twice, or four times across a diagonal
+    for (int i = 0; i < 4; ++i) changes += id(i) != id(i + 1);
+    const bool is_checkered = id(0) == id(2) && id(1) == id(3);
+    junctions |= (changes > 2 && !is_checkered) << face;
+  }
+  return junctions;
+}
+
 const CellSheets& sheets_of(std::uint8_t corners, bool is_split) {
   return (is_split ? kSheetTables.split : kSheetTables.sheets)[corners];
 }
@@ -154,10 +170,6 @@ void LabelTile::find_edges() {
     }
 }
 
-int LabelTile::corner_at(int corner) const {
-  return window_.at(corner & 1, corner >> 1 & 1, corner >> 2);
-}
-
 /// The points of the tile's cells and of the layer of cells behind them, and of all cells that
 /// smoothing takes into account.
 void LabelTile::find_points() {
@@ -181,19 +193,20 @@ void LabelTile::find_points() {
 }
 
 void LabelTile::add_point(int cell) {
-  const auto id = [&](int corner) {
-    return ids_[static_cast<std::size_t>(cell + corner_at(corner))];
-  };
-  int edges = 0, junctions = 0;
-  for (int e = 0; e < 12; ++e) edges |= (id(low_corner(e)) != id(low_corner(e) | 1 << e / 4)) << e;
-  for (int face = 0; face < 6; ++face) {
-    const auto& c = case_rule::kFaces[face];
-    int changes = 0;  // around the face; two labels change twice, or four times across a diagonal
-    for (int i = 0; i < 4; ++i) changes += id(c[i]) != id(c[(i + 1) % 4]);
-    const bool is_checkered = id(c[0]) == id(c[2]) && id(c[1]) == id(c[3]);
-    junctions |= (changes > 2 && !is_checkered) << face;
+  const std::array<Id, 8> ids = corner_ids(cell);
+  int edges = 0;
+  for (int e = 0; e < 12; ++e) {
+    const auto low = static_cast<std::size_t>(low_corner(e));
+    edges |= (ids[low] != ids[low | std::size_t{1} << e / 4]) << e;
   }
-  points_.add(cell, edges, junctions);
+  points_.add(cell, edges, smoothing_.iterations > 0 ? junctions_of(ids) : 0);
+}
+
+std::array<LabelTile::Id, 8> LabelTile::corner_ids(int cell) const {
+  const Id* first = ids_.data() + cell;
+  const auto [x, y, z] = window_.steps();
+  return {first[0], first[x],     first[y],     first[y + x],
+          first[z], first[z + x], first[z + y], first[z + y + x]};
 }
 
 void LabelTile::visit_cells() {
@@ -216,10 +229,7 @@ void LabelTile::visit_cells() {
 
 /// Gives the labels of a cell their vertices.
 void LabelTile::visit_cell(int cell, const std::array<int, 3>& place) {
-  std::array<Id, 8> ids;
-  for (int corner = 0; corner < 8; ++corner)
-    ids[static_cast<std::size_t>(corner)] =
-        ids_[static_cast<std::size_t>(cell + corner_at(corner))];
+  const std::array<Id, 8> ids = corner_ids(cell);
   const int behind = window_.margin + static_cast<int>(kTileEdge);
   const bool is_foreign = place[0] >= behind || place[1] >= behind || place[2] >= behind;
   unsigned seen = 0;
@@ -235,10 +245,10 @@ void LabelTile::visit_cell(int cell, const std::array<int, 3>& place) {
 }
 
 std::uint8_t LabelTile::corners_with(Id id, int cell) const {
+  const std::array<Id, 8> ids = corner_ids(cell);
   unsigned corners = 0;
-  for (int corner = 0; corner < 8; ++corner)
-    corners |= static_cast<unsigned>(ids_[static_cast<std::size_t>(cell + corner_at(corner))] == id)
-               << corner;
+  for (std::size_t corner = 0; corner < 8; ++corner)
+    corners |= static_cast<unsigned>(ids[corner] == id) << corner;
   return static_cast<std::uint8_t>(corners);
 }
 

@@ -106,7 +106,7 @@ class LabelTile {
   void add_point(int cell);
   void visit_cells();
   void visit_cell(int cell, const std::array<int, 3>& place);
-  int corner_at(int corner) const;
+  std::array<Id, 8> corner_ids(int cell) const;
   std::uint8_t corners_with(Id id, int cell) const;
   bool is_split(Id id, std::uint8_t corners, int cell) const;
   void add_vertices(Id id, std::uint8_t corners, int cell, bool is_foreign);
