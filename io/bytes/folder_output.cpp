@@ -15,15 +15,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-bool is_there(const fs::path& path) {
-  return fs::symlink_status(path).type() != fs::file_type::not_found;
-}
-
-/// The path without the slashes that it may end in.
-fs::path without_slash(const fs::path& path) {
-  return path.has_filename() ? path : path.parent_path();
-}
-
 }  // namespace
 
 FolderOutput::FolderOutput(fs::path path, bool force, IsOwnName is_own_name)

@@ -36,6 +36,14 @@ fs::file_type type_of(DIR* folder, const dirent& entry, const fs::path& path) {
 
 }  // namespace
 
+bool is_there(const std::filesystem::path& path) {
+  return std::filesystem::symlink_status(path).type() != std::filesystem::file_type::not_found;
+}
+
+std::filesystem::path without_slash(const std::filesystem::path& path) {
+  return path.has_filename() || !path.has_relative_path() ? path : path.parent_path();
+}
+
 std::vector<FolderEntry> folder_entries(const fs::path& path) {
   const std::unique_ptr<DIR, FolderDeleter> folder(::opendir(path.c_str()));
   if (!folder) throw system_error("look into the folder", path.string(), errno);

@@ -20,6 +20,12 @@ struct FolderEntry {
   std::filesystem::file_type type;  ///< of a link that it is one
 };
 
+/// Whether something has that name, if only a link that leads nowhere.
+bool is_there(const std::filesystem::path& path);
+
+/// The path without the slashes that it may end in.
+std::filesystem::path without_slash(const std::filesystem::path& path);
+
 /// What a folder holds, in no particular order. Throws Error where it cannot be read.
 std::vector<FolderEntry> folder_entries(const std::filesystem::path& folder);
 

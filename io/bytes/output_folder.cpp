@@ -79,11 +79,6 @@ int remove_entries(UniqueFd fd) {
   return 0;
 }
 
-/// Without the empty name that a slash at the end makes.
-fs::path without_slash(const fs::path& path) {
-  return path.has_filename() || !path.has_relative_path() ? path : path.parent_path();
-}
-
 }  // namespace
 
 /// Something in an open folder; without a name it is the folder itself.

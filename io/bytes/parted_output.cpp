@@ -20,10 +20,6 @@ fs::path part_folder(const fs::path& path, int number) {
   return path.string() + ".parts" + (number == 1 ? "" : fmt::format("-{}", number));
 }
 
-bool is_there(const fs::path& path) {
-  return fs::symlink_status(path).type() != fs::file_type::not_found;
-}
-
 /// Throws when the folder must stay.
 void check_folder(const fs::path& folder, bool replace) {
   if (!replace)

@@ -22,10 +22,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-bool is_there(const fs::path& path) {
-  return fs::symlink_status(path).type() != fs::file_type::not_found;
-}
-
 bool is_folder(const fs::path& path) { return fs::is_directory(fs::symlink_status(path)); }
 
 bool has_marker(const fs::path& folder) {
