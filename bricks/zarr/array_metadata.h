@@ -9,7 +9,7 @@
 #include <isobrick/scalar.h>
 #include <isobrick/vec.h>
 #include "bricks/zarr/codec.h"
-#include "bricks/zarr/stored_type.h"
+#include "core/wide_type.h"
 
 namespace isobrick::inline v0 {
 

@@ -4,7 +4,7 @@
 
 #include <isobrick/scalar.h>
 #include "bricks/zarr/json_reader.h"
-#include "bricks/zarr/stored_type.h"
+#include "core/wide_type.h"
 
 namespace isobrick::inline v0 {
 namespace {

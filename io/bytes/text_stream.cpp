@@ -50,6 +50,8 @@ bool parse(std::string_view word, T& value) {
         whole < static_cast<double>(std::numeric_limits<T>::min()) ||
         whole > static_cast<double>(std::numeric_limits<T>::max()))
       return false;
+    // A double may have rounded what is longer.
+    if (sizeof(T) == 8 && std::abs(whole) >= 0x1p53) return false;
     value = static_cast<T>(whole);
     return true;
   }
@@ -57,37 +59,42 @@ bool parse(std::string_view word, T& value) {
 
 class TextStream final : public ByteStream {
  public:
-  TextStream(std::unique_ptr<ByteStream> text, ScalarType type)
+  TextStream(std::unique_ptr<ByteStream> text, StoredType type)
       : text_(std::move(text)),
         type_(type),
         buffer_(std::make_unique_for_overwrite<char[]>(kBuffer)) {}
 
   std::size_t read(std::byte* out, std::size_t size) override {
-    return visit_scalar(type_, [&](auto tag) {
-      using T = typename decltype(tag)::type;
-      std::size_t done = 0;
-      for (; done + sizeof(T) <= size; done += sizeof(T)) {
-        const std::string_view word = next_word();
-        if (word.empty()) break;
-        T value{};
-        if (!parse(word, value)) refuse(word);
-        std::memcpy(out + done, &value, sizeof(T));
-      }
-      return done;
-    });
+    if (type_.wide == WideType::i64) return read_as<std::int64_t>(out, size);
+    if (type_.wide == WideType::u64) return read_as<std::uint64_t>(out, size);
+    return visit_scalar(type_.type,
+                        [&](auto tag) { return read_as<typename decltype(tag)::type>(out, size); });
   }
 
   std::string name() const override { return text_->name(); }
   /// A number takes a digit and a blank, the last one no blank.
   std::uint64_t max_bytes() const override {
     const std::uint64_t text = text_->max_bytes(), numbers = text / 2 + text % 2;
-    return numbers > std::numeric_limits<std::uint64_t>::max() / size_of(type_)
+    return numbers > std::numeric_limits<std::uint64_t>::max() / size_of(type_.type)
                ? std::numeric_limits<std::uint64_t>::max()
-               : numbers * size_of(type_);
+               : numbers * size_of(type_.type);
   }
   std::size_t memory() const override { return text_->memory() + kBuffer; }
 
  private:
+  template <class T>
+  std::size_t read_as(std::byte* out, std::size_t size) {
+    std::size_t done = 0;
+    for (; done + sizeof(T) <= size; done += sizeof(T)) {
+      const std::string_view word = next_word();
+      if (word.empty()) break;
+      T value{};
+      if (!parse(word, value)) refuse(word);
+      std::memcpy(out + done, &value, sizeof(T));
+    }
+    return done;
+  }
+
   /// The next number's text, or nothing at the end.
   std::string_view next_word() {
     for (;;) {
@@ -122,7 +129,7 @@ class TextStream final : public ByteStream {
   }
 
   std::unique_ptr<ByteStream> text_;
-  ScalarType type_;
+  StoredType type_;
   std::unique_ptr<char[]> buffer_;
   std::size_t begin_ = 0, end_ = 0;  ///< of what is in the buffer and was not parsed
   std::uint64_t consumed_ = 0;
@@ -131,7 +138,7 @@ class TextStream final : public ByteStream {
 
 }  // namespace
 
-std::unique_ptr<ByteStream> make_text_stream(std::unique_ptr<ByteStream> text, ScalarType type) {
+std::unique_ptr<ByteStream> make_text_stream(std::unique_ptr<ByteStream> text, StoredType type) {
   return std::make_unique<TextStream>(std::move(text), type);
 }
 

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <memory>
 
-#include <isobrick/scalar.h>
+#include "core/wide_type.h"
 #include "io/bytes/byte_stream.h"
 #include "io/vtk/vtk_file.h"
 
@@ -35,7 +35,8 @@ struct VtkNumbers {
       ~std::uint64_t{0};  ///< as the file states them; the largest where it doesn't
 };
 
-/// Decodes an array. Text becomes numbers of `type`, in this machine's byte order.
-VtkNumbers open_vtk_array(const VtkFile& file, const VtkArrayLayout& layout, ScalarType type);
+/// Decodes an array. Text becomes numbers of `type` as they are stored, in this machine's byte
+/// order.
+VtkNumbers open_vtk_array(const VtkFile& file, const VtkArrayLayout& layout, StoredType type);
 
 }  // namespace isobrick

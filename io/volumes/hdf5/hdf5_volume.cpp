@@ -11,6 +11,7 @@
 #include <isobrick/error.h>
 #include <isobrick/pod_buffer.h>
 #include "io/volumes/hdf5/hdf5_dataset.h"
+#include "io/volumes/widened_source.h"
 
 namespace isobrick::inline v0 {
 namespace {
@@ -164,8 +165,11 @@ std::unique_ptr<VolumeSource> open_hdf5(const std::string& file, const std::stri
     transform.spacing = spacing_of(view, opened->element_size());
     transform.unit = "micrometer";
   }
-  VolumeInfo info = describe_volume(file, view.extent, opened->type(), transform, request);
-  return std::make_unique<Hdf5Source>(std::move(info), std::move(opened), view, std::move(fixed));
+  const StoredType type = opened->type();
+  VolumeInfo info = describe_volume(file, view.extent, type.type, transform, request);
+  return widen_source(
+      std::make_unique<Hdf5Source>(std::move(info), std::move(opened), view, std::move(fixed)),
+      type.wide);
 }
 
 }  // namespace isobrick

@@ -5,8 +5,8 @@
 #include <string>
 
 #include <isobrick/array_view.h>
-#include <isobrick/scalar.h>
 #include <isobrick/transform.h>
+#include "core/wide_type.h"
 #include "io/volumes/scaled_source.h"
 
 namespace isobrick::inline v0 {
@@ -14,10 +14,10 @@ namespace isobrick::inline v0 {
 /// The header of a NIfTI file.
 struct NiftiHeader {
   ArrayView view;
-  ScalarType type = ScalarType::u8;  ///< as stored
-  bool swap = false;                 ///< of the other byte order
-  bool detached = false;             ///< the samples lie in a file of their own (.hdr and .img)
-  std::uint64_t offset = 0;          ///< of the first sample of the array
+  StoredType type;
+  bool swap = false;         ///< of the other byte order
+  bool detached = false;     ///< the samples lie in a file of their own (.hdr and .img)
+  std::uint64_t offset = 0;  ///< of the first sample of the array
   ValueScale scale;
   bool is_label_image = false;  ///< its intent is NIFTI_INTENT_LABEL
   Transform transform;          ///< to the space of sform, else of qform, else of the spacing alone

@@ -15,6 +15,7 @@
 #include "io/volumes/raw/raw_source.h"
 #include "io/volumes/raw/text_header.h"
 #include "io/volumes/stream_source.h"
+#include "io/volumes/widened_source.h"
 
 namespace isobrick::inline v0 {
 namespace {
@@ -71,6 +72,12 @@ bool has_image_name(const std::string& path) {
   return name.ends_with(".img") || name.ends_with(".img.gz");
 }
 
+/// The real values of the samples as they are stored.
+std::unique_ptr<VolumeSource> scaled(std::unique_ptr<VolumeSource> stored,
+                                     const NiftiHeader& header) {
+  return scale_source(widen_source(std::move(stored), header.type.wide), header.scale);
+}
+
 }  // namespace
 
 std::string nifti_header_beside(const std::string& path) {
@@ -95,10 +102,10 @@ std::unique_ptr<VolumeSource> open_nifti(const std::string& path, const VolumeRe
   refuse_raw_description(path, "a NIfTI file", request);
   const NiftiHeader header = parse_nifti_header(path, read_head(path), request.selection);
   const std::string data_path = header.detached ? image_path(path) : path;
-  const std::size_t sample = size_of(header.type);
+  const std::size_t sample = size_of(header.type.type);
   SampleLayout layout;
   layout.info =
-      describe_volume(data_path, header.view.extent, header.type, header.transform, request);
+      describe_volume(data_path, header.view.extent, header.type.type, header.transform, request);
   layout.info.files = {path, data_path};
   if (header.is_label_image) layout.info.labels.emplace();
   layout.offset = header.offset + static_cast<std::uint64_t>(header.view.first) * sample;
@@ -107,14 +114,14 @@ std::unique_ptr<VolumeSource> open_nifti(const std::string& path, const VolumeRe
   if (header.detached) layout.header = path;
   const std::uint64_t end = header.offset + static_cast<std::uint64_t>(header.view.total) * sample;
   if (is_packed(data_path, path))
-    return scale_source(make_stream_source(std::move(layout), open_stream(data_path, path, true),
-                                           end, AfterEnd::noted),
-                        header.scale);
+    return scaled(make_stream_source(std::move(layout), open_stream(data_path, path, true), end,
+                                     AfterEnd::noted),
+                  header);
   File file = open_data_file(data_path, path);
   check_header_promise(layout, file);
   if (const std::uint64_t size = file.size(); size > end)
     layout.notes.push_back(trailing_note(quoted(file.path()), size - end));
-  return scale_source(make_raw_source(std::move(layout), std::move(file)), header.scale);
+  return scaled(make_raw_source(std::move(layout), std::move(file)), header);
 }
 
 }  // namespace isobrick

@@ -13,14 +13,15 @@
 #include <isobrick/error.h>
 #include "core/length_unit.h"
 #include "core/printable.h"
+#include "io/volumes/raw/slicer_segments.h"
 
 namespace isobrick::inline v0 {
 namespace {
 
-std::optional<ScalarType> parse_type(const std::string& name) {
+std::optional<StoredType> parse_type(const std::string& name) {
   struct TypeNames {
-    ScalarType type;
-    std::array<std::string_view, 6> names;
+    StoredType type;
+    std::array<std::string_view, 7> names;
   };
   static constexpr TypeNames all[] = {
       {ScalarType::i8, {"signed char", "int8", "int8_t"}},
@@ -30,6 +31,11 @@ std::optional<ScalarType> parse_type(const std::string& name) {
       {ScalarType::u16, {"ushort", "unsigned short", "unsigned short int", "uint16", "uint16_t"}},
       {ScalarType::i32, {"int", "signed int", "int32", "int32_t"}},
       {ScalarType::u32, {"uint", "unsigned int", "uint32", "uint32_t"}},
+      {WideType::i64,
+       {"longlong", "long long", "long long int", "signed long long", "signed long long int",
+        "int64", "int64_t"}},
+      {WideType::u64,
+       {"ulonglong", "unsigned long long", "unsigned long long int", "uint64", "uint64_t"}},
       {ScalarType::f32, {"float"}},
       {ScalarType::f64, {"double"}},
   };
@@ -340,21 +346,6 @@ std::string read_unit(const Fields& fields, const std::string& name, std::size_t
   return shared ? first : std::string();
 }
 
-/// "0.5 0.68 0.45": red, green and blue from 0 to 1.
-std::optional<std::array<std::uint8_t, 4>> parse_segment_colour(const std::string& text) {
-  std::array<std::uint8_t, 4> colour{0, 0, 0, 255};
-  const auto words = split_words(text);
-  if (words.size() != 3) return std::nullopt;
-  for (std::size_t i = 0; i < 3; ++i) {
-    double part = 0;
-    const auto [end, error] =
-        std::from_chars(words[i].data(), words[i].data() + words[i].size(), part);
-    if (error != std::errc{} || !(part >= 0 && part <= 1)) return std::nullopt;
-    colour[i] = static_cast<std::uint8_t>(std::lround(part * 255));
-  }
-  return colour;
-}
-
 /// What export keeps of a grid in key/value pairs.
 void read_grid(const Fields& fields, TextHeader& header) {
   constexpr std::size_t kMaxClass = 100, kMaxName = 1000;
@@ -364,33 +355,10 @@ void read_grid(const Fields& fields, TextHeader& header) {
   if (fill.empty()) return;
   double value = 0;
   const auto [end, error] = std::from_chars(fill.data(), fill.data() + fill.size(), value);
-  if (error != std::errc{} || end != fill.data() + fill.size() || !holds(header.type, value))
+  if (error != std::errc{} || end != fill.data() + fill.size() || !holds(header.type.type, value))
     header_error(fields.path(), fmt::format("'{}': '{}' is no {}", kNrrdFillValue,
                                             printable(fill, 60), short_name(header.type)));
   header.fill_value = value;
-}
-
-/// The segments of 3D Slicer, in key/value pairs such as Segment0_LabelValue.
-void read_segments(const Fields& fields, TextHeader& header) {
-  constexpr std::size_t kMaxName = 1000;
-  for (int i = 0;; ++i) {
-    const auto pair = [&](const char* key) {
-      return fields.pair(fmt::format("Segment{}_{}", i, key));
-    };
-    if (pair("ID").empty()) break;
-    if (!header.labels) header.labels.emplace();
-    const std::string value = pair("LabelValue");
-    LabelProperties segment;
-    const auto [end, error] =
-        std::from_chars(value.data(), value.data() + value.size(), segment.label);
-    if (error != std::errc{} || end != value.data() + value.size() || value.empty()) continue;
-    segment.name = printable(pair("Name"), kMaxName);
-    segment.colour = parse_segment_colour(pair("Color"));
-    header.labels->push_back(std::move(segment));
-  }
-  if (!header.labels) return;
-  std::stable_sort(header.labels->begin(), header.labels->end(),
-                   [](const auto& a, const auto& b) { return a.label < b.label; });
 }
 
 }  // namespace
@@ -408,7 +376,8 @@ TextHeader parse_nrrd_header(const std::string& path, const Selection& selection
   if (header.transform.unit.empty())
     header.transform.unit = read_unit(fields, "units", dimension, header.view.kept);
   read_grid(fields, header);
-  read_segments(fields, header);
+  header.labels = read_slicer_segments([&](const std::string& key) { return fields.pair(key); },
+                                       selection.channel.value_or(0));
   return header;
 }
 

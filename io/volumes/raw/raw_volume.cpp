@@ -20,6 +20,7 @@
 #include "io/volumes/raw/raw_name.h"
 #include "io/volumes/raw/raw_source.h"
 #include "io/volumes/stream_source.h"
+#include "io/volumes/widened_source.h"
 
 namespace isobrick::inline v0 {
 namespace {
@@ -131,7 +132,7 @@ void take_grid(const TextHeader& header, VolumeInfo& info) {
   info.grid_class = header.grid_class;
   info.grid_name = header.grid_name;
   info.labels = header.labels;
-  if (header.fill_value && info.type == header.type) info.fill_value = *header.fill_value;
+  if (header.fill_value && info.type == header.type.type) info.fill_value = *header.fill_value;
 }
 
 std::vector<fs::path> files_of(const TextHeader& header) {
@@ -145,7 +146,8 @@ std::unique_ptr<VolumeSource> open_described(const TextHeader& header, const Vol
                                              DescribedBy by, File file) {
   const std::string& path = header.data_paths[0];
   if (request.extent || request.type || request.offset) by = DescribedBy::caller;
-  const ScalarType type = request.type.value_or(header.type);
+  const StoredType stored = request.type ? StoredType(*request.type) : header.type;
+  const ScalarType type = stored.type;
   SampleLayout layout;
   layout.info = describe_volume(path, request.extent.value_or(header.view.extent), type,
                                 header.transform, request);
@@ -171,7 +173,7 @@ std::unique_ptr<VolumeSource> open_described(const TextHeader& header, const Vol
     layout.offset += static_cast<std::uint64_t>(header.view.first) * size_of(type);
     layout.stride = header.view.stride;
   }
-  return make_raw_source(std::move(layout), std::move(file));
+  return widen_source(make_raw_source(std::move(layout), std::move(file)), stored.wide);
 }
 
 /// The bytes of one data file, from where its samples begin.
@@ -229,24 +231,25 @@ std::unique_ptr<VolumeSource> open_text_volume(const TextHeader& header,
   refuse_raw_description(header.path, "a header that describes its samples", rest);
   if (header.data_at_end)
     header_error(header.path, "samples at the end of a file must be raw and in one file");
+  const ScalarType type = header.type.type;
   SampleLayout layout;
-  layout.info =
-      describe_volume(header.path, header.view.extent, header.type, header.transform, request);
+  layout.info = describe_volume(header.path, header.view.extent, type, header.transform, request);
   take_grid(header, layout.info);
   layout.info.files = files_of(header);
-  const std::size_t sample = size_of(header.type);
+  const std::size_t sample = size_of(type);
   layout.offset = static_cast<std::uint64_t>(header.view.first) * sample;
   layout.stride = header.view.stride;
   if (!header.attached()) layout.header = header.path;
   const std::uint64_t end = static_cast<std::uint64_t>(header.view.total) * sample;
   auto stream = open_all_data(header);
   if (header.encoding != Encoding::text)
-    layout.swap = must_swap(order_of(header, header.type, request), header.type);
+    layout.swap = must_swap(order_of(header, type, request), type);
   // More files than the header's extent needs are a mistake in it.
   const AfterEnd after_end = header.data_paths.size() > 1        ? AfterEnd::refused
                              : header.encoding == Encoding::text ? AfterEnd::noted_as_numbers
                                                                  : AfterEnd::noted;
-  return make_stream_source(std::move(layout), std::move(stream), end, after_end);
+  return widen_source(make_stream_source(std::move(layout), std::move(stream), end, after_end),
+                      header.type.wide);
 }
 
 namespace {
@@ -303,10 +306,10 @@ std::unique_ptr<VolumeSource> open_stdin(const VolumeRequest& request) {
   if (offset > std::numeric_limits<std::uint64_t>::max() / 2)
     throw UsageError(fmt::format("an offset of {} bytes is too large", offset));
   SampleLayout layout;
-  layout.info = describe_volume(name, header.view.extent, header.type, {}, request);
+  layout.info = describe_volume(name, header.view.extent, header.type.type, {}, request);
   layout.info.files.clear();
   layout.offset = offset;
-  layout.swap = must_swap(request.order.value_or(ByteOrder::little), header.type);
+  layout.swap = must_swap(request.order.value_or(ByteOrder::little), header.type.type);
   const std::uint64_t end = layout.end();
   return make_stream_source(std::move(layout), make_stdin_stream(), end);
 }

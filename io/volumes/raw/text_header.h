@@ -7,10 +7,10 @@
 #include <vector>
 
 #include <isobrick/array_view.h>
-#include <isobrick/scalar.h>
 #include <isobrick/transform.h>
 #include <isobrick/vec.h>
 #include <isobrick/volume_request.h>
+#include "core/wide_type.h"
 #include "io/bytes/file.h"
 
 namespace isobrick::inline v0 {
@@ -27,7 +27,7 @@ struct TextHeader {
   bool data_at_end = false;             ///< instead: the samples are the end of the file
   Encoding encoding = Encoding::raw;
   ArrayView view;
-  ScalarType type = ScalarType::u8;
+  StoredType type;
   std::optional<ByteOrder> order;
   Transform transform;
   std::string grid_class, grid_name;  ///< as VolumeInfo has them

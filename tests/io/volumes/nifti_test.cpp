@@ -241,9 +241,23 @@ TEST_F(Nifti, WorldSpace) {
   }
 }
 
+TEST_F(Nifti, TheIntentOfLabels) {
+  for (const int version : {1, 2})
+    for (const bool swap : {false, true}) {
+      const std::string content = samples(swap);
+      const auto labels = [&](int intent) {
+        const Header header = Header(version, swap).code(68, 504, intent);
+        return open(header.bytes() + content)->info().labels;
+      };
+      EXPECT_EQ(labels(1002), LabelTable{}) << version << swap;
+      EXPECT_FALSE(labels(0));
+      EXPECT_FALSE(labels(1001));
+    }
+}
+
 TEST_F(Nifti, RefusesWhatIsNotSupportedByName) {
   EXPECT_TRUE(contains(refuse(Header(1).type(128)), "RGB"));
-  EXPECT_TRUE(contains(refuse(Header(1).type(1024)), "64-bit"));
+  EXPECT_TRUE(contains(refuse(Header(1).type(1792)), "complex"));
   EXPECT_TRUE(contains(refuse(Header(1).type(77)), "unknown datatype 77"));
   EXPECT_TRUE(contains(refuse(Header(1).text(344, {"\0\0\0\0", 4})), "ANALYZE"));
   VolumeRequest request;

@@ -35,21 +35,50 @@ TEST_F(NrrdHeader, ReadsSamplesThroughEitherName) {
 }
 
 TEST_F(NrrdHeader, AllSpellingsOfTypes) {
-  const std::pair<ScalarType, std::vector<const char*>> all[] = {
+  const std::pair<StoredType, std::vector<const char*>> all[] = {
       {ScalarType::i8, {"signed char", "int8", "int8_t"}},
       {ScalarType::u8, {"uchar", "unsigned char", "uint8", "uint8_t", "UCHAR"}},
       {ScalarType::i16, {"short", "short int", "signed short", "signed short int", "int16"}},
       {ScalarType::u16, {"ushort", "unsigned short", "unsigned short int", "uint16_t"}},
       {ScalarType::i32, {"int", "signed int", "int32", "int32_t"}},
       {ScalarType::u32, {"uint", "unsigned int", "uint32", "uint32_t"}},
+      {WideType::i64,
+       {"longlong", "long long", "long long int", "signed long long", "signed long long int",
+        "int64", "int64_t"}},
+      {WideType::u64,
+       {"ulonglong", "unsigned long long", "unsigned long long int", "uint64", "uint64_t"}},
       {ScalarType::f32, {"float"}},
       {ScalarType::f64, {"double"}},
   };
   for (const auto& [type, names] : all)
     for (const char* name : names)
       EXPECT_EQ(parse(with("type: short", std::string("type: ") + name)).type, type) << name;
-  for (const char* name : {"block", "int64", "longlong", "", "half"})
+  for (const char* name : {"block", "int128", "", "half"})
     refuse(with("type: short", std::string("type: ") + name));
+}
+
+TEST_F(NrrdHeader, SegmentsOfSlicer) {
+  const std::string segments =
+      "Segmentation_MasterRepresentation:=Binary labelmap\n"
+      "Segment0_ID:=a\nSegment0_Name:=Großhirn\nSegment0_LabelValue:=7\n"
+      "Segment0_Color:=0.5 0 1\nSegment0_Layer:=0\nSegment0_Extent:=0 6 0 4 0 3\n"
+      "Segment1_ID:=b\nSegment1_Name:=spleen\nSegment1_LabelValue:=2\nSegment1_Color:=2 0 0\n"
+      "Segment1_Layer:=1\nSegment2_ID:=c\nSegment2_Name:=\xff\nSegment2_LabelValue:=-4\n"
+      "Segment3_ID:=d\nSegment3_LabelValue:=x\nSegment4_ID:=e\nSegment4_LabelValue:=7\n"
+      "Segment6_ID:=none\nSegment6_LabelValue:=1\n";
+  const TextHeader plain = parse(kPlain + segments);
+  ASSERT_TRUE(plain.labels);
+  EXPECT_EQ(*plain.labels, (LabelTable{{-4, "?", {}}, {7, "Großhirn", {{128, 0, 255, 255}}}}))
+      << "the first of those with one value; none of another layer";
+  EXPECT_FALSE(parse(kPlain).labels);
+  EXPECT_TRUE(parse(std::string(kPlain) + "Segment0_ID:=a\n").labels->empty());
+  const std::string layers = with("dimension: 3\nsizes: 7 5 4",
+                                  "dimension: 4\nsizes: 2 7 5 4\nkinds: list domain domain "
+                                  "domain") +
+                             segments;
+  refuse(layers);
+  selection.channel = 1;
+  EXPECT_EQ(*parse(layers).labels, (LabelTable{{2, "spleen", {}}}));
 }
 
 TEST_F(NrrdHeader, Geometry) {

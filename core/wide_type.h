@@ -9,7 +9,7 @@
 
 namespace isobrick::inline v0 {
 
-/// Types of Zarr that are none of ours: samples of them are widened as they are read, without
+/// Types of files that are none of ours: samples of them are widened as they are read, without
 /// loss. u64 and i64 become f64, f16 becomes f32, and a bool the u8 0 or 1.
 enum class WideType : std::uint8_t { u64, i64, f16, boolean };
 
@@ -36,6 +36,23 @@ constexpr ScalarType widened(WideType type) {
 constexpr std::size_t size_of(WideType type) {
   constexpr std::size_t sizes[] = {8, 8, 2, 1};
   return sizes[static_cast<int>(type)];
+}
+
+/// The type of samples in a file: one of ours, or what is widened to one.
+struct StoredType {
+  ScalarType type = ScalarType::u8;  ///< of the samples as they are read
+  std::optional<WideType> wide;      ///< what is stored, where that is none of our types
+
+  constexpr StoredType() = default;
+  constexpr StoredType(ScalarType ours) : type(ours) {}
+  constexpr StoredType(WideType stored) : type(widened(stored)), wide(stored) {}
+
+  friend bool operator==(const StoredType&, const StoredType&) = default;
+};
+
+/// The name of what is stored, for messages.
+constexpr std::string_view short_name(const StoredType& stored) {
+  return stored.wide ? zarr_name(*stored.wide) : short_name(stored.type);
 }
 
 /// Widens `count` samples, native byte order. `stored` may be the last bytes of `samples`.

@@ -1,4 +1,4 @@
-#include "bricks/zarr/stored_type.h"
+#include "core/wide_type.h"
 
 #include <fmt/format.h>
 
