@@ -33,6 +33,16 @@ void for_each_entry(const JsonReader& image_label, const char* list, const F& f)
   }
 }
 
+/// What its properties call a label: `name`, else `label-name`, else the first text of any key,
+/// which is what segmentation programs that have no such key put there ("class").
+std::string name_in(const JsonReader& properties) {
+  for (const char* key : {"name", "label-name"})
+    if (properties.has(key) && properties.raw()[key].is_string()) return properties.string_at(key);
+  for (const auto& [key, value] : properties.raw().items())
+    if (value.is_string()) return value.get<std::string>();
+  return {};
+}
+
 std::optional<std::array<std::uint8_t, 4>> parse_rgba(const JsonReader& entry) {
   if (!entry.has("rgba")) return std::nullopt;
   const JsonReader rgba = entry.at("rgba");
@@ -61,9 +71,7 @@ LabelTable parse_image_label(const JsonReader& image_label) {
     by_label[label].colour = parse_rgba(entry);
   });
   for_each_entry(image_label, "properties", [&](const JsonReader& entry, std::int64_t label) {
-    LabelProperties& properties = by_label[label];
-    for (const char* key : {"name", "label-name"})
-      if (entry.has(key) && entry.raw()[key].is_string()) properties.name = entry.string_at(key);
+    by_label[label].name = name_in(entry);
   });
   LabelTable table;
   for (auto& [label, properties] : by_label) {

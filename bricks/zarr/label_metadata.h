@@ -11,8 +11,9 @@
 
 namespace isobrick::inline v0 {
 
-/// OME-Zarr's `image-label`: names are those of `properties`, as `name` or `label-name`, and
-/// colours those of `colors`. What it has of labels that are no whole numbers is left out.
+/// OME-Zarr's `image-label`: names are those of `properties`, as `name`, `label-name` or else
+/// the first text, and colours those of `colors`. What it has of labels that are no whole numbers
+/// is left out.
 LabelTable parse_image_label(const JsonReader& image_label);
 
 /// The same as JSON. Of more than kMaxDescribedLabels nothing is kept, because all of an image's
