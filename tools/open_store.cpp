@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include <isobrick/error.h>
+#include "bricks/storage/open_storage.h"
 #include "bricks/zarr/metadata_files.h"
 #include "core/shell_word.h"
 #include "io/bytes/folder_walk.h"
@@ -103,8 +104,8 @@ void check_store(const std::string& path) {
   if (is_url(path)) return;
   std::error_code ignored;
   const fs::file_status status = fs::status(path, ignored);
-  if (!fs::exists(status)) refuse_missing(path);
   if (is_zarr(path)) return;
+  if (!fs::exists(status)) refuse_missing(path);
   if (fs::is_regular_file(status)) refuse_file(path);
   if (fs::is_directory(status)) refuse_folder(path);
 }
@@ -120,6 +121,7 @@ void check_input(const std::string& path) {
   std::error_code ignored;
   const fs::file_status status = fs::status(file, ignored);
   if (path == "-") return;
+  if (find_folder_in_zip(file)) return;
   const bool store_name = extension_of(file) == ".zarr";
   if (!fs::exists(status)) {
     if (store_name || fs::exists(staging_path(path))) refuse_missing(path);

@@ -12,6 +12,7 @@
 #include <isobrick/convert.h>
 #include <isobrick/error.h>
 #include <isobrick/storage.h>
+#include "bricks/storage/open_storage.h"
 #include "bricks/zarr/metadata_files.h"
 #include "core/cancellable_progress.h"
 #include "core/file_error.h"
@@ -109,6 +110,7 @@ std::string key_of(const std::string& path, const VolumeInfo& info, const OpenOp
   if (options.downsampling) key += fmt::format("downsample {}\n", name_of(*options.downsampling));
   if (fs::is_directory(path) && is_zarr(path))
     return key + identity_of(path) + identity_of_folder(path);
+  if (const auto place = find_folder_in_zip(path)) key += fmt::format("folder {}\n", place->folder);
   for (const fs::path& file : info.files) key += identity_of(file);
   return key;
 }
