@@ -70,6 +70,11 @@ int run_convert(const ConvertArguments& arguments, Console& console) {
   ConvertOptions options = arguments.store;
   options.inputs = input_paths(arguments.in);
   note_conversion(out);
+  if (source->info().labels && options.downsampling && *options.downsampling == Downsampling::mean)
+    console.note(
+        "it is a label image, and --downsample mean makes labels of coarser levels that none of "
+        "its "
+        "samples has; mode, the default, does not");
   const ConvertReport report = arguments.in == "-"
                                    ? convert_stream(*source, out, options, console)
                                    : convert(*source, out, options, console.progress());

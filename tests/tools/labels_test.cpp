@@ -173,6 +173,81 @@ TEST_F(LabelOption, LabelImagesInAGroupAreListed) {
   expect_refused(run({"info", path("scan.zarr")}), 1, {"labels/.zattrs"});
 }
 
+TEST_F(LabelOption, LabelImagesOfAGroupAreInputs) {
+  const auto triangles = [&](const std::string& input) {
+    run_json({"extract", input, "--labels", "all", "-o", path("meshes"), "--force"});
+    return list("meshes")["labels"];
+  };
+  const nlohmann::json expected = triangles(store_);
+  fs::create_directories(path("scan.zarr/labels"));
+  for (const char* version : {"0.4", "0.5"}) {
+    const std::string name = path("scan.zarr/labels/cells") + version;
+    run_json({"convert", store_, name, "--ome", version, "--brick", "16"});
+    EXPECT_EQ(triangles(name), expected) << version;
+    const nlohmann::json info = run_json({"info", name});
+    EXPECT_EQ(info["labels"], nlohmann::json::array()) << version;
+    EXPECT_NE(run({"info", name}).out.find("label image  0 names, 0 colours"), std::string::npos);
+    EXPECT_EQ(run({"verify", name}).exit_code, 0) << version;
+  }
+  // The same in a zip, next to an image.
+  fs::copy(path("scan.zarr/labels/cells0.5"), path("scan.zarr"), fs::copy_options::recursive);
+  write_file(path("scan.zarr/labels/.zattrs"), R"({"labels": ["cells0.4", "cells0.5"]})");
+  const std::string zip = path("scan.zarr.zip");
+  const std::string python =
+      "import os, sys, zipfile\n"
+      "store, out = sys.argv[1:]\n"
+      "with zipfile.ZipFile(out, 'w') as zip:\n"
+      "  for folder, _, names in os.walk(store):\n"
+      "    for name in names:\n"
+      "      zip.write(os.path.join(folder, name), os.path.relpath(os.path.join(folder, name), "
+      "store))\n";
+  ASSERT_EQ(run_process({"python3", "-c", python, path("scan.zarr"), zip}).exit_code, 0);
+  EXPECT_EQ(run_json({"info", zip})["label_images"],
+            nlohmann::json::parse(R"(["cells0.4", "cells0.5"])"));
+  for (const char* name : {"/labels/cells0.4", "/labels/cells0.5/"}) {
+    EXPECT_EQ(triangles(zip + name), expected) << name;
+    EXPECT_EQ(run_json({"info", zip + name})["labels"], nlohmann::json::array()) << name;
+    EXPECT_EQ(run({"verify", zip + name}).exit_code, 0) << name;
+    run_json({"convert", zip + name, path("again.zarr"), "--force", "--brick", "16"});
+    EXPECT_EQ(triangles(path("again.zarr")), expected) << name;
+    expect_refused(run({"index", zip + name}), 2, {"is a zip"});
+  }
+  expect_refused(run({"info", zip + "/labels/none"}), 1, {"scan.zarr.zip/labels/none"});
+  expect_refused(run({"info", path("none.zip/labels/a")}), 1, {"none.zip/labels/a"});
+}
+
+TEST_F(LabelOption, AMeanOfLabelsIsMadeWithANote) {
+  const auto convert = [&](const std::string& out, const char* rule) {
+    Outcome outcome = run({"convert", store_, path(out), "--downsample", rule, "--brick", "16"});
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+    return outcome.err;
+  };
+  EXPECT_NE(convert("mean.zarr", "mean").find("label image"), std::string::npos);
+  EXPECT_NE(read_file(path("mean.zarr/zarr.json")).find("\"type\": \"mean\""), std::string::npos);
+  EXPECT_EQ(convert("mode.zarr", "mode").find("label image"), std::string::npos);
+  EXPECT_EQ(convert("max.zarr", "max").find("label image"), std::string::npos);
+}
+
+TEST_F(LabelOption, SixtyFourBitLabels) {
+  std::string samples(8 * 8 * 8 * 8, '\0');
+  for (std::size_t i = 0; i < samples.size(); i += 8) samples[i + 4] = i < 2048 ? 1 : 2;
+  const std::string header =
+      "NRRD0004\ntype: uint64\ndimension: 3\nsizes: 8 8 8\nencoding: raw\n"
+      "endian: little\nSegment0_ID:=a\nSegment0_Name:=big\n"
+      "Segment0_LabelValue:=8589934592\n\n";
+  write_file(path("big.nrrd"), header + samples);
+  run_json({"extract", path("big.nrrd"), "--labels", "all", "-o", path("meshes")});
+  const nlohmann::json labels = list("meshes")["labels"];
+  ASSERT_EQ(labels.size(), 2u);
+  EXPECT_EQ(labels[0]["label"], 4294967296);
+  EXPECT_EQ(labels[1]["name"], "big");
+  samples[8 * 100] = 1;
+  samples[8 * 100 + 7] = 1;
+  write_file(path("big.nrrd"), header + samples);
+  expect_refused(run({"convert", path("big.nrrd"), path("never.zarr")}), 1,
+                 {"big.nrrd", "72057598332895233", "y = 4, z = 1"});
+}
+
 TEST_F(LabelOption, ReplacesOnlyItsOwnFolder) {
   extract({"--labels", "7", "-o", path("out")});
   const Arguments again{"extract", store_, "--labels", "8", "-o", path("out")};
