@@ -174,8 +174,16 @@ MeshFilter::MeshFilter(MeshSink& sink, const MeshFilterOptions& options)
 MeshFilter::~MeshFilter() = default;
 
 Indexing MeshFilter::indexing() const { return stages_->first().indexing(); }
-void MeshFilter::begin(const MeshHeader& header) { stages_->first().begin(header); }
-void MeshFilter::write(const MeshChunk& chunk) { stages_->first().write(chunk); }
+void MeshFilter::begin(const MeshHeader& header) {
+  MeshHeader plain = header;
+  plain.attributes.clear();
+  stages_->first().begin(plain);
+}
+void MeshFilter::write(const MeshChunk& chunk) {
+  MeshChunk plain = chunk;
+  plain.attributes = {};
+  stages_->first().write(plain);
+}
 void MeshFilter::finish() { stages_->first().finish(); }
 std::uint64_t MeshFilter::bytes() const { return stages_->first().bytes(); }
 std::uint64_t MeshFilter::memory() const { return stages_->first().memory(); }

@@ -7,6 +7,8 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
+#include <vector>
 
 #include <isobrick/api.h>
 #include <isobrick/pod_buffer.h>
@@ -31,6 +33,12 @@ enum class Indexing : std::uint8_t {
   chunk_local,
 };
 
+/// A number at each vertex, such as a sample of another volume. A view, as MeshChunk is.
+struct VertexAttribute {
+  std::string_view name;          ///< as MeshHeader::attributes has it
+  std::span<const float> values;  ///< one a vertex; NaN: not known
+};
+
 /// A piece of a mesh, in world space. A view: valid until the call returns.
 struct MeshChunk {
   std::uint64_t first_vertex = 0;              ///< number of vertices in the chunks before
@@ -38,6 +46,8 @@ struct MeshChunk {
   std::span<const Vec3f> normals;              ///< unit length, outward; empty or one a position
   std::span<const Triangle> triangles;         ///< numbered by MeshSink::indexing()
   std::span<const VertexColour> colours = {};  ///< of meshes of others; empty or one a position
+  /// Those of MeshHeader::attributes, in that order.
+  std::span<const VertexAttribute> attributes = {};
 };
 
 struct MeshFileOptions;
@@ -97,6 +107,9 @@ struct MeshHeader {
   /// Bounds of the blocks that the surface passes through, within the region; nothing: not known.
   std::optional<MeshBounds> surface = {};
   std::string unit = {};  ///< of all coordinates, as unit_name() has it; empty: unknown
+  /// Names of the vertex attributes that every chunk has. Sinks without a place for them ignore
+  /// them, as filters and MemorySink do.
+  std::vector<std::string> attributes = {};
 };
 
 /// Takes a mesh chunk by chunk. Calls come from one thread at a time, in order.

@@ -27,6 +27,8 @@ ISOBRICK_API std::optional<MeshFormat> find_mesh_format(std::string_view extensi
 ISOBRICK_API bool has_normals(MeshFormat format);
 /// Whether its triangles share vertices, so that it has a number of them.
 ISOBRICK_API bool has_vertices(MeshFormat format);
+/// Whether it holds MeshChunk::attributes: PLY, GLB, VTP and PVTP do. Others ignore them.
+ISOBRICK_API bool has_attributes(MeshFormat format);
 
 /// How a mesh file is written.
 struct MeshFileOptions {

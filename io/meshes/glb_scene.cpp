@@ -10,6 +10,7 @@
 
 #include "core/box_union.h"
 #include "core/length_unit.h"
+#include "io/meshes/vertex_rows.h"
 
 namespace isobrick::inline v0 {
 namespace {
@@ -48,6 +49,13 @@ ordered_json triple(Vec3f v) {
 
 ordered_json whole_triple(Vec3f v) {
   return {static_cast<int>(v.x), static_cast<int>(v.y), static_cast<int>(v.z)};
+}
+
+/// As glTF has names of its own users' attributes.
+std::string attribute_name(std::string name) {
+  for (char& c : name)
+    if (c >= 'a' && c <= 'z') c = static_cast<char>(c - 'a' + 'A');
+  return "_" + name;
 }
 
 ordered_json material() {
@@ -100,6 +108,16 @@ void Lists::add(const GlbVertices& form, const GlbPrimitive& primitive) {
     if (form.quantized) normals["normalized"] = true;
     accessors.push_back(std::move(normals));
   }
+  std::size_t offset = form.vector_bytes();
+  for (const std::string& name : form.attributes) {
+    attributes[attribute_name(name)] = accessors.size();
+    accessors.push_back({{"bufferView", rows},
+                         {"byteOffset", offset},
+                         {"componentType", kFloat},
+                         {"count", primitive.vertices},
+                         {"type", "SCALAR"}});
+    offset += sizeof(float);
+  }
   const std::size_t indices = accessors.size();
   accessors.push_back({{"bufferView", rows + 1},
                        {"componentType", kUint32},
@@ -132,8 +150,12 @@ void Bounds3f::include(const Bounds3f& other) {
   if (!other.empty) include(std::array{other.lo, other.hi});
 }
 
-std::size_t GlbVertices::row_bytes() const {
+std::size_t GlbVertices::vector_bytes() const {
   return (normals ? 2 : 1) * (quantized ? sizeof(Quantized) : sizeof(Vec3f));
+}
+
+std::size_t GlbVertices::row_bytes() const {
+  return vector_bytes() + attributes.size() * sizeof(float);
 }
 
 Vec3f GlbVertices::stored(Vec3f position) const {
@@ -150,21 +172,24 @@ Bounds3f GlbVertices::stored(const Bounds3f& bounds) const {
 }
 
 Bounds3f GlbVertices::append(FileWriter& out, std::span<const std::byte> rows) const {
-  const std::size_t from_bytes = (normals ? 2 : 1) * sizeof(Vec3f);
+  const std::size_t from_vectors = isobrick::row_bytes(normals);
+  const std::size_t from_bytes = isobrick::row_bytes(normals, attributes.size());
   const std::size_t count = rows.size() / from_bytes;
   std::byte* to = out.reserve(count * row_bytes());
   Bounds3f bounds;
   for (std::size_t i = 0; i < count; ++i, to += row_bytes()) {
     std::array<Vec3f, 2> row;
-    std::memcpy(row.data(), rows.data() + i * from_bytes, from_bytes);
+    const std::byte* from = rows.data() + i * from_bytes;
+    std::memcpy(row.data(), from, from_vectors);
     row[0] = stored(row[0]);
     bounds.include({&row[0], 1});
     if (quantized) {
       const std::array<Quantized, 2> packed{on_grid(row[0]), signed_fractions(row[1])};
-      std::memcpy(to, packed.data(), row_bytes());
+      std::memcpy(to, packed.data(), vector_bytes());
     } else {
-      std::memcpy(to, row.data(), row_bytes());
+      std::memcpy(to, row.data(), vector_bytes());
     }
+    std::memcpy(to + vector_bytes(), from + from_vectors, from_bytes - from_vectors);
   }
   out.commit(count * row_bytes());
   return bounds;

@@ -29,14 +29,19 @@ struct GlbVertices {
   Vec3d origin;     ///< of the grid, world units
   double step = 1;  ///< of the grid, the same along all axes, so that normals stay right
   std::string unit = {};
+  /// Names of vertex attributes, which become custom ones in capitals: "_TEMPERATURE". Their floats
+  /// end each row.
+  std::vector<std::string> attributes = {};
 
   /// The grid that covers `bounds`.
   void set_grid(const Bounds3f& bounds);
   std::size_t row_bytes() const;
+  /// The part of it before the attributes.
+  std::size_t vector_bytes() const;
   /// A position as stored; whole numbers on a grid.
   Vec3f stored(Vec3f position) const;
   Bounds3f stored(const Bounds3f& bounds) const;
-  /// Appends rows of float x y z [nx ny nz], at most FileWriter::kBuffer bytes, in
+  /// Appends rows as append_rows() writes them, at most FileWriter::kBuffer bytes, in
   /// this form. Returns the bounds of their positions as stored.
   Bounds3f append(FileWriter& out, std::span<const std::byte> rows) const;
 };

@@ -1,5 +1,9 @@
 #include "io/meshes/glb_sink.h"
 
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -7,8 +11,17 @@ namespace isobrick::inline v0 {
 namespace {
 
 constexpr std::string_view kPartExtension = ".bin";
-/// What the JSON of one primitive and the headers take at most.
-constexpr std::uint64_t kStartBytes = 4096;
+/// What the JSON of one primitive and the headers take at most, and what an attribute adds.
+constexpr std::uint64_t kStartBytes = 4096, kAttributeBytes = 256;
+
+/// glTF forbids numbers that are not finite: NaN becomes the lowest float, and infinities become
+/// the floats next to them.
+std::vector<float> finite_values(std::span<const float> values) {
+  constexpr float most = std::numeric_limits<float>::max();
+  std::vector<float> finite(values.begin(), values.end());
+  for (float& value : finite) value = std::isnan(value) ? -most : std::clamp(value, -most, most);
+  return finite;
+}
 
 }  // namespace
 
@@ -21,10 +34,17 @@ void GlbSink::begin(const MeshHeader& header) {
   PartedMeshSink::begin(header);
   vertices_.normals = header.has_normals;
   vertices_.unit = header.unit;
+  vertices_.attributes = header.attributes;
 }
 
 void GlbSink::write(const MeshChunk& chunk) {
-  PartedMeshSink::write(chunk);
+  std::vector<std::vector<float>> finite;
+  std::vector<VertexAttribute> attributes;
+  for (const VertexAttribute& attribute : chunk.attributes)
+    attributes.push_back({attribute.name, finite.emplace_back(finite_values(attribute.values))});
+  MeshChunk allowed = chunk;
+  allowed.attributes = attributes;
+  PartedMeshSink::write(allowed);
   bounds_.include(chunk.positions);
 }
 
@@ -66,7 +86,7 @@ void GlbSink::finish() {
                            .vertex_bytes = size().vertices * vertices_.row_bytes()};
   if (size().triangles == 0)
     output().index().writer().append(glb_start(glb_json(vertices_, {}), 0));
-  else if (kStartBytes + whole.bytes() <= file_bytes_)
+  else if (kStartBytes + attributes().size() * kAttributeBytes + whole.bytes() <= file_bytes_)
     finish_whole(whole);
   else
     finish_parts();

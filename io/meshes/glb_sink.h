@@ -23,7 +23,8 @@ struct GlbOptions {
 /// Writes a welded mesh as binary glTF 2.0, coordinates in world units as they
 /// are; see GlbVertices for their unit. One primitive in one file; beyond GlbOptions::file_bytes
 /// one primitive a part, with a buffer each in the folder `path`.parts, vertices that several parts
-/// name repeated in each. A mesh without triangles is an empty scene.
+/// name repeated in each. A mesh without triangles is an empty scene. Vertex attributes become
+/// custom ones, see GlbVertices; glTF has no NaN, for which the lowest float stands.
 class GlbSink final : public PartedMeshSink {
  public:
   /// See PartedOutput for what `path` and `force` may throw.

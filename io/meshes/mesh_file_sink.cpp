@@ -59,6 +59,10 @@ bool has_normals(MeshFormat format) { return format != MeshFormat::stl; }
 
 bool has_vertices(MeshFormat format) { return format != MeshFormat::stl; }
 
+bool has_attributes(MeshFormat format) {
+  return format != MeshFormat::stl && format != MeshFormat::obj;
+}
+
 std::unique_ptr<MeshSink> create_mesh_file(const std::filesystem::path& path,
                                            const MeshFileOptions& options) {
   const std::string name = path.string();

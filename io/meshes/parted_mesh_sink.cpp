@@ -41,7 +41,7 @@ void PartedMeshSink::append_whole(FileWriter& out) {
 
 void PartedMeshSink::for_each_row_run(const MeshPart& part,
                                       const std::function<void(std::span<const std::byte>)>& take) {
-  isobrick::for_each_row_run({rows_, row_bytes(has_normals_)}, part, take);
+  isobrick::for_each_row_run({rows_, row_bytes(has_normals_, attributes_.size())}, part, take);
 }
 
 void PartedMeshSink::for_each_triangle_run(

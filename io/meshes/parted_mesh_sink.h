@@ -5,6 +5,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include <isobrick/mesh.h>
 #include "io/bytes/output_file.h"
@@ -23,6 +24,7 @@ class PartedMeshSink : public MeshSink {
   void begin(const MeshHeader& header) override {
     has_normals_ = header.has_normals;
     unit_ = header.unit;
+    attributes_ = header.attributes;
   }
   void write(const MeshChunk& chunk) override;
   std::uint64_t bytes() const override;
@@ -35,6 +37,8 @@ class PartedMeshSink : public MeshSink {
   bool has_normals() const { return has_normals_; }
   /// MeshHeader::unit.
   const std::string& unit() const { return unit_; }
+  /// MeshHeader::attributes.
+  const std::vector<std::string>& attributes() const { return attributes_; }
   MeshSize size() const { return size_; }
   PartedOutput& output() { return out_; }
   const PartedOutput& output() const { return out_; }
@@ -42,7 +46,7 @@ class PartedMeshSink : public MeshSink {
   /// Creates a file for each part of the mesh, in order, and calls write_part(file, part).
   void write_parts(std::string_view extension,
                    const std::function<void(FileWriter&, const MeshPart&)>& write_part);
-  /// Appends the whole mesh: rows of float x y z [nx ny nz], then triangles of UInt32.
+  /// Appends the whole mesh: rows as append_rows() writes them, then triangles of UInt32.
   void append_whole(FileWriter& out);
   /// Calls take(bytes) for runs of a part's rows; see mesh_parts.h.
   void for_each_row_run(const MeshPart& part,
@@ -64,6 +68,7 @@ class PartedMeshSink : public MeshSink {
   MeshSize size_;
   bool has_normals_ = false;
   std::string unit_;
+  std::vector<std::string> attributes_;
 };
 
 }  // namespace isobrick

@@ -37,19 +37,24 @@ PlySink::PlySink(std::string path, bool force, std::size_t memory)
 /// zeros for octal and some choke on trailing blanks.
 std::string PlySink::header_text() const {
   const std::string counts = fmt::format("{}{}", vertices_, triangles_);
+  std::string properties =
+      has_normals_ ? "property float nx\nproperty float ny\nproperty float nz\n" : "";
+  for (const std::string& name : attributes_)
+    properties += fmt::format("property float {}\n", name);
   const std::size_t most = 2 * std::numeric_limits<std::uint64_t>::digits10 + 2;
   return fmt::format(
       "ply\nformat binary_little_endian 1.0\ncomment Isobrick {}\n{}"
       "element vertex {}\nproperty float x\nproperty float y\nproperty float z\n{}"
       "element face {}\nproperty list uchar uint vertex_indices\nend_header\n",
       std::string(most - counts.size(), '.'),
-      unit_.empty() ? "" : fmt::format("comment unit {}\n", unit_), vertices_,
-      has_normals_ ? "property float nx\nproperty float ny\nproperty float nz\n" : "", triangles_);
+      unit_.empty() ? "" : fmt::format("comment unit {}\n", unit_), vertices_, properties,
+      triangles_);
 }
 
 void PlySink::begin(const MeshHeader& header) {
   has_normals_ = header.has_normals;
   unit_ = header.unit;
+  attributes_ = header.attributes;
   out_.writer().append(header_text());
 }
 

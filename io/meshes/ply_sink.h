@@ -2,15 +2,17 @@
 
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include <isobrick/mesh.h>
 #include "io/bytes/output_file.h"
 
 namespace isobrick::inline v0 {
 
-/// Writes a welded mesh as binary little-endian PLY: float x y z [nx ny nz],
-/// faces as `list uchar uint vertex_indices`. The vertex numbers are uint, not
-/// int, because a mesh may have up to 2³² − 1 vertices. A unit is a comment: "unit micrometer".
+/// Writes a welded mesh as binary little-endian PLY: float x y z [nx ny nz] and a
+/// float for each vertex attribute, faces as `list uchar uint vertex_indices`. The vertex numbers
+/// are uint, not int, because a mesh may have up to 2³² − 1 vertices. A unit is a comment: "unit
+/// micrometer".
 class PlySink final : public MeshSink {
  public:
   /// See OutputFile for what `path` and `force` may throw. The faces come behind all vertices:
@@ -33,6 +35,7 @@ class PlySink final : public MeshSink {
   FileWriter faces_;  ///< waits until all vertices are known
   bool has_normals_ = false;
   std::string unit_;
+  std::vector<std::string> attributes_;
   std::uint64_t vertices_ = 0, triangles_ = 0;
 };
 

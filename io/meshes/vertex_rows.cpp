@@ -1,5 +1,6 @@
 #include "io/meshes/vertex_rows.h"
 
+#include <algorithm>
 #include <bit>
 #include <cstring>
 
@@ -10,7 +11,32 @@ namespace isobrick::inline v0 {
 static_assert(std::endian::native == std::endian::little, "floats are written as they lie");
 static_assert(sizeof(Vec3f) == 12);
 
+namespace {
+
+void append_attributed_rows(FileWriter& out, const MeshChunk& chunk) {
+  const bool normals = !chunk.normals.empty();
+  const std::size_t row = row_bytes(normals, chunk.attributes.size());
+  const std::size_t batch = FileWriter::kBuffer / row;
+  for (std::size_t first = 0; first < chunk.positions.size(); first += batch) {
+    const std::size_t end = std::min(chunk.positions.size(), first + batch);
+    std::byte* to = out.reserve((end - first) * row);
+    const auto put = [&to](const auto& value) {
+      std::memcpy(to, &value, sizeof(value));
+      to += sizeof(value);
+    };
+    for (std::size_t i = first; i < end; ++i) {
+      put(chunk.positions[i]);
+      if (normals) put(chunk.normals[i]);
+      for (const VertexAttribute& attribute : chunk.attributes) put(attribute.values[i]);
+    }
+    out.commit((end - first) * row);
+  }
+}
+
+}  // namespace
+
 void append_rows(FileWriter& out, const MeshChunk& chunk) {
+  if (!chunk.attributes.empty()) return append_attributed_rows(out, chunk);
   if (chunk.normals.empty()) {
     out.append(std::as_bytes(chunk.positions));
     return;

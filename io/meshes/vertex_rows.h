@@ -8,10 +8,12 @@
 namespace isobrick::inline v0 {
 
 /// Bytes of one vertex as append_rows writes it.
-constexpr std::size_t row_bytes(bool normals) { return (normals ? 2 : 1) * sizeof(Vec3f); }
+constexpr std::size_t row_bytes(bool normals, std::size_t attributes = 0) {
+  return (normals ? 2 : 1) * sizeof(Vec3f) + attributes * sizeof(float);
+}
 
-/// Appends the chunk's vertices as rows of float x y z [nx ny nz], little endian;
-/// with normals exactly when the chunk has them.
+/// Appends the chunk's vertices as rows of float x y z [nx ny nz] and the attributes, little
+/// endian; with normals and attributes exactly when the chunk has them.
 void append_rows(FileWriter& out, const MeshChunk& chunk);
 
 }  // namespace isobrick

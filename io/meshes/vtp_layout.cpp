@@ -15,6 +15,8 @@ static_assert(std::endian::native == std::endian::little, "numbers are written a
 
 /// Twenty digits in each place and the longest unit fill some 1400.
 constexpr std::size_t kHeaderBytes = 1536;
+/// What the declaration of an attribute adds, but for its name.
+constexpr std::size_t kAttributeBytes = 128;
 
 std::string data_array(std::string_view type, std::string_view name, int components,
                        std::uint64_t offset) {
@@ -74,6 +76,10 @@ std::string VtpLayout::header() const {
         "      <PointData Normals=\"Normals\">\n" + data_array("Float32", "Normals", 3, offset);
     offset += length + point_bytes();
   }
+  for (const std::string& name : attributes) {
+    point_data += data_array("Float32", name, 1, offset);
+    offset += length + attribute_bytes();
+  }
   std::string text = fmt::format(
       "<?xml version=\"1.0\"?>\n"
       "<VTKFile type=\"PolyData\" version=\"1.0\" byte_order=\"LittleEndian\" "
@@ -87,7 +93,9 @@ std::string VtpLayout::header() const {
       data_array("Float32", "Points", 3, 0), data_array(number, "connectivity", 1, offset),
       data_array(number, "offsets", 1, offset + length + connectivity_bytes()));
   constexpr std::string_view data = "\n  <AppendedData encoding=\"raw\">\n   _";
-  text.resize(kHeaderBytes - data.size(), ' ');
+  std::size_t bytes = kHeaderBytes;
+  for (const std::string& name : attributes) bytes += kAttributeBytes + name.size();
+  text.resize(bytes - data.size(), ' ');
   return text.append(data);
 }
 

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <span>
 #include <string>
+#include <vector>
 
 #include <isobrick/mesh.h>
 #include "io/bytes/output_file.h"
@@ -11,17 +12,19 @@ namespace isobrick::inline v0 {
 
 /// A VTK PolyData file (.vtp) of one piece: XML, then the arrays appended raw,
 /// little endian, each behind its length in bytes as UInt64: points, normals,
-/// connectivity, offsets. A unit is a string in the field data, named "unit".
+/// attributes, connectivity, offsets. A unit is a string in the field data, named "unit".
 struct VtpLayout {
   MeshSize size;
   bool normals = false;
   std::string unit = {};
+  std::vector<std::string> attributes = {};  ///< names of the arrays of a float a point
 
   /// Numbers are Int32 where they fit, as VTK holds them, and Int64 otherwise.
   bool wide() const;
   /// All that comes before the points; its length does not depend on the sizes.
   std::string header() const;
   std::uint64_t point_bytes() const { return size.vertices * sizeof(Vec3f); }
+  std::uint64_t attribute_bytes() const { return size.vertices * sizeof(float); }
   std::uint64_t connectivity_bytes() const;
   std::uint64_t offset_bytes() const;
 };

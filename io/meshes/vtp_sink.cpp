@@ -31,11 +31,12 @@ std::string named_in_xml(std::string path) {
   return path;
 }
 
-/// Appends the floats [first, first + 3) of each row.
+/// Appends the bytes [first, first + kBytes) of each row.
+template <std::size_t kBytes>
 void append_column(FileWriter& out, std::span<const std::byte> rows, std::size_t row,
                    std::size_t first) {
-  append_items<sizeof(Vec3f)>(out, rows.size() / row, [&](std::byte* to, std::uint64_t i) {
-    std::memcpy(to, rows.data() + i * row + first, sizeof(Vec3f));
+  append_items<kBytes>(out, rows.size() / row, [&](std::byte* to, std::uint64_t i) {
+    std::memcpy(to, rows.data() + i * row + first, kBytes);
   });
 }
 
@@ -49,6 +50,9 @@ VtpSink::VtpSink(std::string path, bool force)
 void VtpSink::begin(const MeshHeader& header) {
   layout_.normals = header.has_normals;
   layout_.unit = header.unit;
+  layout_.attributes = header.attributes;
+  for (std::size_t i = 0; i < header.attributes.size(); ++i)
+    attributes_.push_back(open_scratch_beside(out_.path()));
   out_.writer().append(layout_.header());
   append_length(out_.writer(), 0);
 }
@@ -59,6 +63,14 @@ void VtpSink::write(const MeshChunk& chunk) {
   out_.writer().append(std::as_bytes(chunk.positions));
   normals_.append(std::as_bytes(chunk.normals));
   triangles_.append(std::as_bytes(chunk.triangles));
+  for (std::size_t i = 0; i < attributes_.size(); ++i)
+    attributes_[i].append(std::as_bytes(chunk.attributes[i].values));
+}
+
+std::uint64_t VtpSink::bytes() const {
+  std::uint64_t bytes = out_.writer().size() + normals_.size() + triangles_.size();
+  for (const FileWriter& values : attributes_) bytes += values.size();
+  return bytes;
 }
 
 void VtpSink::finish() {
@@ -70,6 +82,11 @@ void VtpSink::finish() {
   if (layout_.normals) {
     append_length(out, points);
     out.append_file(normals_);
+  }
+  for (FileWriter& values : attributes_) {
+    append_length(out, layout_.attribute_bytes());
+    out.append_file(values);
+    values.release();
   }
   append_length(out, layout_.connectivity_bytes());
   if (layout_.wide()) {
@@ -90,13 +107,21 @@ PvtpSink::PvtpSink(std::string path, bool force, std::uint64_t part_triangles)
     : PartedMeshSink(named_in_xml(std::move(path)), force, part_triangles) {}
 
 void PvtpSink::write_part(FileWriter& out, const MeshPart& part) {
-  const VtpLayout layout{{part.vertices(), part.triangles}, has_normals(), unit()};
-  const std::size_t row = row_bytes(has_normals());
+  const VtpLayout layout{{part.vertices(), part.triangles}, has_normals(), unit(), attributes()};
+  const std::size_t vectors = row_bytes(has_normals());
+  const std::size_t row = row_bytes(has_normals(), attributes().size());
   out.append(layout.header());
-  for (std::size_t column = 0; column < row; column += sizeof(Vec3f)) {
+  for (std::size_t column = 0; column < vectors; column += sizeof(Vec3f)) {
     append_length(out, layout.point_bytes());
-    for_each_row_run(part,
-                     [&](std::span<const std::byte> run) { append_column(out, run, row, column); });
+    for_each_row_run(part, [&](std::span<const std::byte> run) {
+      append_column<sizeof(Vec3f)>(out, run, row, column);
+    });
+  }
+  for (std::size_t column = vectors; column < row; column += sizeof(float)) {
+    append_length(out, layout.attribute_bytes());
+    for_each_row_run(part, [&](std::span<const std::byte> run) {
+      append_column<sizeof(float)>(out, run, row, column);
+    });
   }
   append_length(out, layout.connectivity_bytes());
   for_each_triangle_run(
@@ -112,17 +137,27 @@ void PvtpSink::finish() {
   output().publish();
 }
 
+/// The declaration of what the points of all parts have.
+std::string PvtpSink::point_data_text() const {
+  if (!has_normals() && attributes().empty()) return {};
+  std::string text =
+      has_normals()
+          ? "    <PPointData Normals=\"Normals\">\n"
+            "      <PDataArray type=\"Float32\" Name=\"Normals\" NumberOfComponents=\"3\"/>\n"
+          : "    <PPointData>\n";
+  for (const std::string& name : attributes())
+    text += fmt::format(
+        "      <PDataArray type=\"Float32\" Name=\"{}\" NumberOfComponents=\"1\"/>\n", name);
+  return text + "    </PPointData>\n";
+}
+
 std::string PvtpSink::index_text() const {
   std::string text =
       "<?xml version=\"1.0\"?>\n"
       "<VTKFile type=\"PPolyData\" version=\"1.0\" byte_order=\"LittleEndian\" "
       "header_type=\"UInt64\">\n"
       "  <PPolyData GhostLevel=\"0\">\n";
-  if (has_normals())
-    text +=
-        "    <PPointData Normals=\"Normals\">\n"
-        "      <PDataArray type=\"Float32\" Name=\"Normals\" NumberOfComponents=\"3\"/>\n"
-        "    </PPointData>\n";
+  text += point_data_text();
   text +=
       "    <PPoints>\n"
       "      <PDataArray type=\"Float32\" Name=\"Points\" NumberOfComponents=\"3\"/>\n"

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include <isobrick/mesh.h>
 #include "io/bytes/output_file.h"
@@ -20,13 +21,12 @@ class VtpSink final : public MeshSink {
   void begin(const MeshHeader& header) override;
   void write(const MeshChunk& chunk) override;
   void finish() override;
-  std::uint64_t bytes() const override {
-    return out_.writer().size() + normals_.size() + triangles_.size();
-  }
+  std::uint64_t bytes() const override;
 
  private:
-  OutputFile out_;                  ///< header and points; the rest at the end
-  FileWriter normals_, triangles_;  ///< wait until all points are written
+  OutputFile out_;                      ///< header and points; the rest at the end
+  FileWriter normals_, triangles_;      ///< wait until all points are written
+  std::vector<FileWriter> attributes_;  ///< so do the values of each
   VtpLayout layout_;
 };
 
@@ -43,6 +43,7 @@ class PvtpSink final : public PartedMeshSink {
 
  private:
   void write_part(FileWriter& out, const MeshPart& part);
+  std::string point_data_text() const;
   std::string index_text() const;
 };
 
