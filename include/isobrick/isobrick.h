@@ -2,6 +2,7 @@
 
 // All of the library: open() and extract() first of all.
 
+#include <isobrick/attributes.h>
 #include <isobrick/convert.h>
 #include <isobrick/device_extractor.h>
 #include <isobrick/error.h>

@@ -65,6 +65,7 @@ const std::map<std::string, Names> kPublicHeaders = {
     {"pipeline/extract", {"estimate", "extract", "index_choice"}},
     {"pipeline/index", {"index_build"}},
     {"pipeline/labels", {"labels"}},
+    {"pipeline/sample", {"attributes"}},
     {"pipeline/verify", {"verify"}},
     {"pipeline/volume", {"device_extractor", "volume", "volume_extractor"}},
     {"isobrick", {"isobrick"}},
