@@ -1,6 +1,5 @@
 #include <isobrick/extract.h>
 
-#include <array>
 #include <cmath>
 #include <filesystem>
 #include <memory>
@@ -25,9 +24,12 @@ using nlohmann::ordered_json;
 /// The files of one surface; null where none was requested.
 struct Sinks {
   std::unique_ptr<MeshSink> mesh, preview;
+  std::unique_ptr<AttributeSink> attributes;  ///< before the mesh; null without attributes
   std::unique_ptr<MeshFilter> mesh_filter, preview_filter;  ///< before them; null without filters
 
-  MeshSink* mesh_input() const { return mesh_filter ? mesh_filter.get() : mesh.get(); }
+  /// What the filters write to: the attributes are of the vertices that leave them.
+  MeshSink* mesh_file() const { return attributes ? attributes.get() : mesh.get(); }
+  MeshSink* mesh_input() const { return mesh_filter ? mesh_filter.get() : mesh_file(); }
   MeshSink* preview_input() const { return preview_filter ? preview_filter.get() : preview.get(); }
   /// Before what the report is of.
   const MeshFilter* reported_filter() const {
@@ -46,9 +48,11 @@ std::unique_ptr<MeshFilter> filter_before(MeshSink* sink, MeshFilterOptions opti
 /// Opens every output before the first extraction, so that one that exists or
 /// cannot be written stops the command at once.
 std::vector<Sinks> open_sinks(const std::vector<ExtractedSurface>& surfaces,
-                              const ExtractArguments& arguments, Progress& progress) {
+                              const ExtractArguments& arguments, const AttributeVolumes& attributes,
+                              Progress& progress) {
   const bool force = arguments.force;
-  const std::array<fs::path, 1> inputs{arguments.input.path};
+  std::vector<fs::path> inputs = paths_of(arguments.attributes);
+  inputs.emplace_back(arguments.input.path);
   std::vector<Sinks> sinks;
   for (const ExtractedSurface& surface : surfaces) {
     check_replaces_no_input(surface.output, inputs);
@@ -61,12 +65,16 @@ std::vector<Sinks> open_sinks(const std::vector<ExtractedSurface>& surfaces,
                                             .force = force,
                                             .threads = arguments.threads,
                                             .memory = memory_of_mesh(surface, surfaces.size())});
+    if (of_surface.mesh && !attributes.empty())
+      of_surface.attributes =
+          std::make_unique<AttributeSink>(*of_surface.mesh, attributes.attributes(),
+                                          attributes.options(arguments.memory, surfaces.size()));
     if (!surface.preview.empty())
       of_surface.preview = open_preview(surface.preview.string(), force, arguments.preview);
     MeshFilterOptions filter = surface.filter;
     // Several may be finished at the same time.
     if (surfaces.size() * arguments.outputs() == 1) filter.progress = &progress;
-    of_surface.mesh_filter = filter_before(of_surface.mesh.get(), filter, surface.output);
+    of_surface.mesh_filter = filter_before(of_surface.mesh_file(), filter, surface.output);
     filter.measure = filter.measure && !of_surface.mesh;  // once is enough
     filter.unit.clear();                                  // cameras know the volume's
     of_surface.preview_filter = filter_before(of_surface.preview.get(), filter, surface.preview);
@@ -160,10 +168,10 @@ CommandOutput estimate_all(const std::vector<ExtractedSurface>& surfaces, const 
 
 CommandOutput make_all(const ExtractArguments& arguments,
                        const std::vector<ExtractedSurface>& surfaces, const StoreReader& store,
-                       Console& console) {
+                       const AttributeVolumes& attributes, Console& console) {
   check_pictures(surfaces, arguments, store);
   if (!arguments.no_space_check) check_space(surfaces, store);
-  const std::vector<Sinks> sinks = open_sinks(surfaces, arguments, console.progress());
+  const std::vector<Sinks> sinks = open_sinks(surfaces, arguments, attributes, console.progress());
   const SurfaceReports made = make(surfaces, sinks, store, console);
   CommandOutput result;
   for (std::size_t i = 0; i < surfaces.size(); ++i) {
@@ -210,11 +218,17 @@ int run_extract(const ExtractArguments& given, Console& console) {
       open_input(arguments.input, arguments.memory, arguments.threads, console);
   const StoreReader& store = input.store();
   choose_mesh_unit(arguments, store, console);
+  const AttributeVolumes attributes(arguments.attributes, arguments.input, arguments.memory,
+                                    arguments.threads, store.info().levels.front().transform.unit,
+                                    console);
+  arguments.attribute_memory =
+      attributes.memory(attributes.options(arguments.memory, arguments.isovalues.size()));
   const std::vector<ExtractedSurface> surfaces = plan_surfaces(arguments, store, console);
   for (const ExtractedSurface& surface : surfaces)
     note_band(surface.options.isovalue, store.info(), console);
-  const CommandOutput output = arguments.estimate ? estimate_all(surfaces, store, console)
-                                                  : make_all(arguments, surfaces, store, console);
+  const CommandOutput output = arguments.estimate
+                                   ? estimate_all(surfaces, store, console)
+                                   : make_all(arguments, surfaces, store, attributes, console);
   ordered_json result{{"command", "extract"},
                       {"input", arguments.input.path},
                       {"level", surfaces.front().options.level},
@@ -323,6 +337,13 @@ void add_extract(Program& program) {
            "Close the surface at the border of the volume or region and around missing samples (on "
            "the CPU)");
   add_filters(app, arguments->filters);
+  add_repeated(app,
+               {"--attribute", "NAME=STORE[:CHANNEL]",
+                "Sample another volume at the vertices, as a vertex attribute of PLY, VTP, PVTP or "
+                "GLB; may be repeated"},
+               [&attributes = arguments->attributes](const std::string& text) {
+                 attributes.push_back(parse_attribute(text));
+               });
   add_text(
       app,
       {"--preset", "print",

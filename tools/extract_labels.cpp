@@ -58,6 +58,7 @@ void check_label_arguments(const ExtractArguments& arguments) {
       {!arguments.isovalues.empty(), "--isovalue"},
       {!arguments.preview.path.empty(), "--preview"},
       {arguments.estimate, "--estimate"},
+      {!arguments.attributes.empty(), "--attribute"},
       {arguments.cap, "--cap"},
       {arguments.for_print, "--preset"},
       {arguments.drop_degenerate, "--drop-degenerate"},

@@ -38,7 +38,7 @@ fs::path default_output(const ExtractArguments& arguments, MeshFormat format, do
 
 /// How the mesh is written, or would be if it had a name.
 MeshForm form_of(const ExtractArguments& arguments) {
-  MeshForm form{.quantize = arguments.quantize};
+  MeshForm form{.quantize = arguments.quantize, .attributes = arguments.attributes.size()};
   if (arguments.format)
     form.format = *arguments.format;
   else if (!arguments.output.empty())
@@ -48,6 +48,11 @@ MeshForm form_of(const ExtractArguments& arguments) {
   if (form.quantize && form.format != MeshFormat::glb)
     throw UsageError(
         fmt::format("--quantize is for GLB only, and this mesh becomes {}", name_of(form.format)));
+  if (form.attributes > 0 && !has_attributes(form.format))
+    throw UsageError(
+        fmt::format("--attribute: {} cannot hold attributes of vertices; choose PLY, VTP, PVTP or "
+                    "GLB",
+                    name_of(form.format)));
   return form;
 }
 
@@ -114,10 +119,10 @@ std::uint64_t filter_memory(const ExtractedSurface& surface) {
 /// The least budget of an extraction for the mesh of a surface.
 std::uint64_t min_of_mesh(const ExtractedSurface& surface, std::size_t surfaces,
                           const ExtractArguments& arguments, const StoreReader& store) {
-  return min_extract_memory(
-      store, surface.options, Indexing::welded,
-      filter_memory(surface) + mesh_file_memory(surface.form.format, arguments.threads,
-                                                memory_of_mesh(surface, surfaces)));
+  return min_extract_memory(store, surface.options, Indexing::welded,
+                            filter_memory(surface) + surface.attribute_memory +
+                                mesh_file_memory(surface.form.format, arguments.threads,
+                                                 memory_of_mesh(surface, surfaces)));
 }
 
 /// The same for its picture.
@@ -164,6 +169,8 @@ std::vector<ExtractedSurface> surfaces_of_level(const ExtractArguments& argument
   const MeshForm form = form_of(arguments);
   MeshFilterOptions filter = filter_options(arguments.filters);
   filter.threads = arguments.threads;
+  std::vector<std::string> names;
+  for (const AttributeRequest& attribute : arguments.attributes) names.push_back(attribute.name);
   std::vector<ExtractedSurface> surfaces;
   for (const double isovalue : isovalues) {
     options.isovalue = isovalue;
@@ -171,8 +178,9 @@ std::vector<ExtractedSurface> surfaces_of_level(const ExtractArguments& argument
         !arguments.output.empty() ? named(arguments.output, isovalue, isovalues.size())
         : arguments.writes_mesh() ? default_output(arguments, form.format, isovalue)
                                   : fs::path();
-    surfaces.push_back(
-        {options, form, output, named(arguments.preview.path, isovalue, isovalues.size()), filter});
+    surfaces.push_back({options, form, output,
+                        named(arguments.preview.path, isovalue, isovalues.size()), filter,
+                        arguments.attribute_memory, names});
   }
   if (!arguments.estimate) share_filter_memory(surfaces, arguments, store);
   return surfaces;
@@ -236,6 +244,15 @@ std::string shortage_text(const PlannedMesh& mesh, const Shortage& shortage, boo
       waits ? fmt::format(" (TMPDIR, now '{}')", mesh.path.parent_path().string()) : "");
 }
 
+/// Refuses attributes that no file could hold.
+void check_attributes(const ExtractArguments& arguments) {
+  std::vector<std::string> names;
+  for (const AttributeRequest& attribute : arguments.attributes) names.push_back(attribute.name);
+  check_attribute_names(names);
+  if (!names.empty() && !arguments.estimate && !arguments.writes_mesh())
+    throw UsageError("--attribute: a picture has none; name a mesh with -o");
+}
+
 }  // namespace
 
 ExtractArguments with_preset(ExtractArguments arguments) {
@@ -265,6 +282,7 @@ void check_arguments(const ExtractArguments& arguments) {
   for (const std::string& output : {arguments.output, arguments.preview.path})
     refuse_url_output(output);
   form_of(arguments);
+  check_attributes(arguments);
   check_filters(arguments.filters, arguments.estimate);
   if (is_standard_output(arguments.output) && is_standard_output(arguments.preview.path))
     throw UsageError("standard output takes a mesh or a picture; name a file for one of them");
@@ -312,7 +330,8 @@ std::uint64_t memory_of_mesh(const ExtractedSurface& surface, std::size_t surfac
 ExtractEstimate estimate_one(const ExtractedSurface& surface, const StoreReader& store) {
   return estimate(
       store, surface.options,
-      mesh_file_memory(surface.form.format, surface.options.threads, surface.options.memory));
+      surface.attribute_memory +
+          mesh_file_memory(surface.form.format, surface.options.threads, surface.options.memory));
 }
 
 /// Refuses meshes that cannot fit their disk, before anything is written.

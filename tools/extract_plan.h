@@ -7,6 +7,7 @@
 
 #include <isobrick/labels.h>
 #include <isobrick/store_reader.h>
+#include "tools/attribute_option.h"
 #include "tools/extract_report.h"
 #include "tools/filter_options.h"
 #include "tools/input.h"
@@ -31,6 +32,8 @@ struct ExtractArguments {
   std::optional<Inside> inside;
   std::optional<bool> normals;  ///< nothing: where the format holds them
   FilterArguments filters;
+  std::vector<AttributeRequest> attributes;
+  std::uint64_t attribute_memory = 0;  ///< that sampling them takes, of each surface
   bool drop_degenerate = false;
   Topology topology = Topology::consistent;
   bool cap = false;

@@ -100,6 +100,7 @@ ordered_json report_json(const ExtractedSurface& surface, const ExtractReport& r
                            {"vertices", filtered.extracted.vertices}};
   if (filtered.simplify_goal) object["simplify_goal"] = *filtered.simplify_goal;
   if (filtered.measure) object["measure"] = measure_json(*filtered.measure);
+  if (!surface.attributes.empty()) object["attributes"] = surface.attributes;
   if (!surface.output.empty()) object["output"] = surface.output.string();
   if (!surface.preview.empty()) object["preview"] = surface.preview.string();
   return object;

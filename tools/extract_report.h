@@ -23,7 +23,9 @@ struct ExtractedSurface {
   ExtractOptions options = {};
   MeshForm form = {};
   std::filesystem::path output, preview;
-  MeshFilterOptions filter = {};  ///< of each of them; without a place for scratch files
+  MeshFilterOptions filter = {};             ///< of each of them; without a place for scratch files
+  std::uint64_t attribute_memory = 0;        ///< that sampling the attributes of the mesh takes
+  std::vector<std::string> attributes = {};  ///< their names
 };
 
 /// What became of a surface on its way to its file.

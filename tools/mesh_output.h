@@ -12,7 +12,8 @@ namespace isobrick::tools {
 struct MeshForm {
   MeshFormat format = MeshFormat::ply;
   bool normals = false;
-  bool quantize = false;  ///< 16 bits a number; GLB only
+  bool quantize = false;       ///< 16 bits a number; GLB only
+  std::size_t attributes = 0;  ///< a float each at a vertex
 };
 
 /// By the name's extension; PLY on standard output. Throws UsageError for any other.

@@ -11,9 +11,11 @@ namespace isobrick::tools {
 namespace fs = std::filesystem;
 
 MeshBytes predict_bytes(const MeshForm& form, MeshSize size) {
-  constexpr std::uint64_t header = 2048, triangle = 12, vector = 12, quantized_vector = 8;
+  constexpr std::uint64_t header = 2048, declaration = 192, triangle = 12, vector = 12,
+                          quantized_vector = 8;
   const std::uint64_t vectors = form.normals ? 2 : 1, v = size.vertices, t = size.triangles;
-  const std::uint64_t rows = v * vectors * vector;
+  const std::uint64_t attributes = v * form.attributes * sizeof(float);
+  const std::uint64_t rows = v * vectors * vector + attributes;
   // What waits in scratch files is on the disk twice for a moment.
   switch (form.format) {
     case MeshFormat::stl: return {header + t * 50, header + t * 50};
@@ -28,12 +30,13 @@ MeshBytes predict_bytes(const MeshForm& form, MeshSize size) {
       return {header + vertices + faces, header + vertices + 2 * faces};
     }
     case MeshFormat::glb: {
-      const std::uint64_t stored = form.quantize ? v * vectors * quantized_vector : rows;
+      const std::uint64_t stored =
+          form.quantize ? v * vectors * quantized_vector + attributes : rows;
       return {header + stored + t * triangle, header + stored + rows + 2 * t * triangle};
     }
     case MeshFormat::vtp: {
-      const std::uint64_t file = header + rows + t * (triangle + 4);
-      return {file, file + (vectors - 1) * v * vector + t * triangle};
+      const std::uint64_t file = header + form.attributes * declaration + rows + t * (triangle + 4);
+      return {file, file + (vectors - 1) * v * vector + attributes + t * triangle};
     }
     case MeshFormat::pvtp: {
       // A few vertices in a hundred belong to several parts.

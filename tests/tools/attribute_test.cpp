@@ -1,0 +1,134 @@
+#include <cmath>
+#include <cstring>
+
+#include "tests/tools/program.h"
+
+namespace isobrick::test {
+namespace {
+
+/// extract --attribute.
+class Attribute : public ProgramTest {
+ protected:
+  Attribute() : store_(make_store("a")), other_(make_store("b", {"--spacing", "2,2,2"})) {}
+
+  Outcome extract(const std::string& output, const Arguments& more) const {
+    Arguments words{"extract", store_, "--isovalue", "127.5", "-o", path(output), "--force"};
+    words.insert(words.end(), more.begin(), more.end());
+    return run(words);
+  }
+  /// What makes it fail, with nothing written.
+  void refuse(const Arguments& more, std::initializer_list<std::string> parts,
+              const std::string& output = "never.ply") const {
+    expect_refused(extract(output, more), 2, parts);
+    EXPECT_FALSE(std::filesystem::exists(path(output)));
+  }
+  std::string made(const std::string& output, const Arguments& more) const {
+    const Outcome outcome = extract(output, more);
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+    return read_file(path(output));
+  }
+
+  std::string store_, other_;
+};
+
+/// The last float of each vertex of a PLY with normals.
+std::vector<float> last_floats(const std::string& ply, std::size_t floats) {
+  const std::string end = "end_header\n", count = "element vertex ";
+  const std::size_t vertices = std::stoul(ply.substr(ply.find(count) + count.size()));
+  const char* row = ply.data() + ply.find(end) + end.size();
+  std::vector<float> values(vertices);
+  for (std::size_t i = 0; i < vertices; ++i)
+    std::memcpy(&values[i], row + (i + 1) * floats * 4 - 4, 4);
+  return values;
+}
+
+TEST_F(Attribute, OfTheVolumeItselfIsTheIsovalue) {
+  const std::string ply = made("m.ply", {"--attribute", "itself=" + store_});
+  EXPECT_NE(ply.find("property float nz\nproperty float itself\nelement face"), ply.npos);
+  const std::vector<float> values = last_floats(ply, 7);
+  ASSERT_GT(values.size(), 100u);
+  for (const float value : values) ASSERT_NEAR(value, 127.5, 0.01);
+}
+
+TEST_F(Attribute, NothingButTheAttributeIsAdded) {
+  const std::string with = made("with.ply", {"--attribute", "p=" + other_, "--normals", "none"});
+  const std::string plain = made("plain.ply", {"--normals", "none"});
+  const std::size_t vertices = last_floats(plain, 3).size();
+  EXPECT_EQ(with.size(), plain.size() + 4 * vertices + std::strlen("property float p\n"));
+}
+
+TEST_F(Attribute, BudgetThreadsAndBricksNeverShow) {
+  const std::string coarse = make_store("c", {"--spacing", "2,2,2", "--brick", "32"});
+  for (const char* name : {"m.ply", "m.glb", "m.vtp"}) {
+    const Arguments plain{"--attribute", "p=" + other_, "--attribute", "q=" + store_};
+    const std::string expected = made(name, plain);
+    Arguments tight = plain;
+    tight.insert(tight.end(), {"--memory", "64M", "--threads", "3"});
+    EXPECT_EQ(made(name, tight), expected) << name;
+    EXPECT_EQ(made(name, {"--attribute", "p=" + coarse, "--attribute", "q=" + store_}), expected);
+  }
+}
+
+TEST_F(Attribute, IsOfTheVerticesThatLeaveTheFilters) {
+  const std::string ply =
+      made("m.ply", {"--attribute", "itself=" + store_, "--simplify", "50%", "--normals", "none"});
+  for (const float value : last_floats(ply, 4)) ASSERT_NEAR(value, 127.5, 3);
+}
+
+TEST_F(Attribute, TheUnitOfTheMeshDoesNotChangeIt) {
+  const std::string metric = make_store("metric", {"--unit", "mm"});
+  Arguments words{"extract",     metric,        "--isovalue",  "127.5",       "-o",
+                  path("m.ply"), "--attribute", "p=" + other_, "--mesh-unit", "um"};
+  ASSERT_EQ(run(words).exit_code, 0);
+  const std::vector<float> scaled = last_floats(read_file(path("m.ply")), 7);
+  const std::vector<float> values = last_floats(made("n.ply", {"--attribute", "p=" + other_}), 7);
+  ASSERT_EQ(scaled.size(), values.size());
+  for (std::size_t i = 0; i < values.size(); ++i) ASSERT_NEAR(scaled[i], values[i], 1e-2);
+}
+
+TEST_F(Attribute, EveryFormatThatHoldsThemDeclaresThem) {
+  const Arguments both{"--attribute", "p=" + other_, "--attribute", "Temp_2=" + other_};
+  EXPECT_NE(made("m.vtp", both).find("Name=\"Temp_2\" NumberOfComponents=\"1\""),
+            std::string::npos);
+  EXPECT_NE(made("m.pvtp", both).find("Name=\"Temp_2\" NumberOfComponents=\"1\""),
+            std::string::npos);
+  EXPECT_NE(made("m.glb", both).find("\"_TEMP_2\":3"), std::string::npos);
+  Arguments quantized = both;
+  quantized.push_back("--quantize");
+  EXPECT_NE(made("q.glb", quantized).find("\"byteStride\":24"), std::string::npos);
+}
+
+TEST_F(Attribute, IsReportedAndEstimated) {
+  const nlohmann::json report =
+      run_json({"extract", store_, "--isovalue", "127.5", "-o", path("m.ply"), "--attribute",
+                "p=" + other_})["surfaces"][0];
+  EXPECT_EQ(report["attributes"], nlohmann::json::array({"p"}));
+  const auto estimated = [&](const Arguments& more) {
+    Arguments words{"extract", store_, "--isovalue", "127.5", "--estimate"};
+    words.insert(words.end(), more.begin(), more.end());
+    return run_json(words)["surfaces"][0];
+  };
+  const nlohmann::json plain = estimated({}), with = estimated({"--attribute", "p=" + other_});
+  EXPECT_EQ(with["file_bytes"].get<int>(),
+            plain["file_bytes"].get<int>() + 4 * plain["vertices"].get<int>());
+  EXPECT_GT(with["memory_bytes"].get<std::int64_t>(), plain["memory_bytes"].get<std::int64_t>());
+}
+
+TEST_F(Attribute, RefusesWhatMakesNoSense) {
+  refuse({"--attribute", "p"}, {"'p' is no attribute", "NAME=STORE"});
+  refuse({"--attribute", "=a"}, {"is no attribute"});
+  refuse({"--attribute", "p="}, {"is no attribute"});
+  refuse({"--attribute", "2p=" + other_}, {"'2p' is no name of an attribute"});
+  refuse({"--attribute", "nx=" + other_}, {"'nx'", "already"});
+  refuse({"--attribute", "p=" + other_, "--attribute", "P=" + other_}, {"'P' is given twice"});
+  refuse({"--attribute", "p=" + other_}, {"STL cannot hold attributes"}, "never.stl");
+  refuse({"--attribute", "p=" + other_}, {"OBJ cannot hold attributes"}, "never.obj");
+  refuse({"--attribute", "p=" + other_ + ":3"}, {"--channel", "3"});
+  expect_refused(extract("never.ply", {"--attribute", "p=" + path("none.zarr")}), 1, {"none.zarr"});
+  expect_refused(
+      run({"extract", store_, "--labels", "all", "-o", path("l"), "--attribute", "p=" + other_}), 2,
+      {"--attribute", "--labels"});
+}
+
+}  // namespace
+}  // namespace isobrick::test
