@@ -1,10 +1,9 @@
 #include "core/wide_type.h"
 
-#include <fmt/format.h>
-
 #include <bit>
 #include <cmath>
 #include <cstring>
+#include <string>
 
 #include <isobrick/error.h>
 
@@ -27,8 +26,8 @@ double exact_double(From value) {
   // 2⁶⁴ and 2⁶³, which the largest integers round to, are none of the type.
   constexpr double end = std::is_signed_v<From> ? 0x1p63 : 0x1p64;
   if (!(as_double < end) || static_cast<From>(as_double) != value)
-    throw Error(fmt::format("the value {} is no float64 exactly, as which 64-bit integers are read",
-                            value));
+    throw Error("the value " + std::to_string(value) +
+                " is no float64 exactly, as which 64-bit integers are read");
   return as_double;
 }
 

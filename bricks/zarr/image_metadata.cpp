@@ -19,7 +19,6 @@ using Json = nlohmann::ordered_json;
 
 constexpr std::size_t kMaxLevels = 64, kMaxAxes = 5;
 constexpr const char* kChecksumKey = "metadata_crc32c";
-constexpr const char* kLabelImageKey = "label_image";
 
 Json zyx(Vec3d v) { return {v.z, v.y, v.x}; }
 
@@ -256,7 +255,6 @@ std::string to_json(const ImageMetadata& image) {
   if (!image.grid_class.empty()) ours["grid_class"] = image.grid_class;
   if (!image.grid_name.empty()) ours["grid_name"] = image.grid_name;
   if (image.may_have_nan) ours["may_have_nan"] = *image.may_have_nan;
-  if (image.labels) ours[kLabelImageKey] = true;
   if (image.checksum) ours[kChecksumKey] = *image.checksum;
 
   Json attributes = Json::object();
@@ -304,15 +302,11 @@ std::uint32_t metadata_checksum(std::string_view root, std::span<const std::stri
   const nlohmann::json parsed = parse_json(root, where);
   const JsonReader attributes = JsonReader(parsed, where).at("attributes");
   nlohmann::json covered = nlohmann::json::object();
-  // Other programs may add to the rest of `ome` how they show the image.
+  // Other programs may change in the rest of `ome` how they show the image, or names of labels.
   covered["multiscales"] = attributes.at("ome").at("multiscales").raw();
   if (attributes.has("isobrick")) covered["isobrick"] = attributes.at("isobrick").raw();
   if (attributes.has("isobrick") && covered["isobrick"].is_object())
     covered["isobrick"].erase(kChecksumKey);
-  // Other programs may mark an image of ours as one of labels; what we wrote of labels is covered.
-  if (attributes.has("isobrick") && attributes.at("isobrick").has(kLabelImageKey) &&
-      attributes.at("ome").has("image-label"))
-    covered["image-label"] = attributes.at("ome").at("image-label").raw();
   covered["levels"] = nlohmann::json::array();
   for (std::size_t i = 0; i < levels.size(); ++i) {
     nlohmann::json level = parse_json(levels[i], fmt::format("{}: level {}", where, i));

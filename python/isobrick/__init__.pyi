@@ -428,6 +428,14 @@ class Volume:
         threads: int = 0,
         progress: _Progress = None,
     ) -> dict[int, Mesh]: ...
+    def sample(
+        self,
+        points: Union[ArrayLike, Mesh],
+        *,
+        unit: Optional[str] = None,
+        memory: _Bytes = ...,
+        threads: int = 0,
+    ) -> NDArray[np.float32]: ...
     def save_mesh(
         self,
         path: _Path,

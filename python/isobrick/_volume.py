@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ._arguments import (
-    box_of, extract_options, filter_options, histogram_bins, integer, is_list, label_options,
-    mesh_file_options, number, one_isovalue, path_text, thread_count,
+    box_of, byte_count, extract_options, filter_options, histogram_bins, integer, is_list,
+    label_options, mesh_file_options, number, one_isovalue, path_text, thread_count, unit_text,
 )
 from ._errors import UsageError
 from ._indexing import read_indexed
@@ -249,6 +249,32 @@ class Volume:
         )
         with reporting(progress) as report:
             return meshes_of(self._native.extract_labels(options, report))
+
+    def sample(self, points, *, unit=None, memory=2**26, threads=0):
+        """The values at points of world space, by trilinear interpolation, as float32.
+
+        Parameters
+        ----------
+        points : array [n, 3], or Mesh
+            Rows x, y, z, such as the vertices of a mesh of another volume.
+        unit : str, optional
+            Of the points, where it is not that of the volume. A mesh has its own.
+        memory : int or str
+            Bytes for decoded bricks: points cost least where neighbours follow each other.
+        threads : int
+            0: all cores.
+
+        Level 0 is sampled. NaN outside of the volume, which ends at its first and last samples.
+        """
+        if isinstance(points, Mesh):
+            unit = points.unit if unit is None else unit
+            points = points.vertices
+        points = np.ascontiguousarray(points, dtype="float32")
+        if points.ndim != 2 or points.shape[1] != 3:
+            raise UsageError(f"points must be rows of x, y, z, not of shape {points.shape}")
+        return self._native.sample(
+            points, unit_text(unit or ""), byte_count(memory), thread_count(threads)
+        )
 
     def _extract_several(self, isovalues, request, filters):
         isovalues = [self.isovalue(one, progress=request["progress"]) for one in isovalues]

@@ -10,6 +10,7 @@
 
 #include <fmt/format.h>
 
+#include <isobrick/attributes.h>
 #include <isobrick/error.h>
 #include <isobrick/estimate.h>
 #include <isobrick/export.h>
@@ -78,6 +79,27 @@ std::vector<std::unique_ptr<Mesh>> extract_meshes(const OpenedVolume& volume,
 std::unique_ptr<Mesh> extract_mesh(const OpenedVolume& volume, const ExtractOptions& options,
                                    const MeshFilterOptions& filters, const py::object& callback) {
   return std::move(extract_meshes(volume, options, filters, {options.isovalue}, callback).front());
+}
+
+/// Values at points, rows of x, y, z.
+py::array_t<float> sample_points(const OpenedVolume& volume,
+                                 const py::array_t<float, py::array::c_style>& points,
+                                 const std::string& unit, std::uint64_t memory, int threads) {
+  static_assert(sizeof(Vec3f) == 3 * sizeof(float));
+  const auto count = static_cast<std::size_t>(points.shape(0));
+  py::array_t<float> values(points.shape(0));
+  const std::span positions(reinterpret_cast<const Vec3f*>(points.data()), count);
+  const std::span<float> out(values.mutable_data(), count);
+  run_interruptibly(py::none(), [&](Reporter reporter) {
+    VolumeSampler sampler(volume.store(), {.unit = unit, .threads = threads, .memory = memory});
+    constexpr std::size_t batch = std::size_t{1} << 18;
+    for (std::size_t i = 0; i < count; i += batch) {
+      if (reporter.cancel.stop_requested()) throw Cancelled("the operation was cancelled");
+      const std::size_t some = std::min(batch, count - i);
+      sampler.sample(positions.subspan(i, some), out.subspan(i, some));
+    }
+  });
+  return values;
 }
 
 py::dict extract_labels_of(const OpenedVolume& volume, const LabelOptions& options,
@@ -229,6 +251,7 @@ void bind_store(py::module_& module) {
       .def("extract_several", &extract_meshes)
       .def("extract_to", &extract_to)
       .def("extract_labels", &extract_labels_of)
+      .def("sample", &sample_points)
       .def("surface_bounds", &bounds_of_surface)
       .def("save_mesh", &save_mesh)
       .def("estimate", &estimate_mesh)

@@ -124,27 +124,16 @@ TEST(LabelMetadata, TooManyToKeep) {
   EXPECT_EQ(image_label_json(table)["properties"].size(), kMaxDescribedLabels);
 }
 
-TEST(LabelMetadata, ChecksumsOfOurLabelImagesCoverThem) {
+TEST(LabelMetadata, OthersMayChangeNames) {
   ImageMetadata image;
   image.levels = {{"0", {}}};
-  const auto checksum = [](const json& root) {
-    return metadata_checksum(root.dump(), std::vector<std::string>{"{}"}, "file");
-  };
-  const json plain = json::parse(to_json(image));
-  json marked = plain;
-  marked["attributes"]["ome"]["image-label"] = json::parse(kTheirs);
-  EXPECT_EQ(checksum(marked), checksum(plain)) << "others may mark an image of ours";
   image.labels = theirs();
-  const json ours = json::parse(to_json(image));
-  json changed = ours;
-  changed["attributes"]["ome"]["image-label"]["properties"][0]["name"] = "other";
-  EXPECT_NE(checksum(changed), checksum(ours));
-  changed = ours;
-  changed["attributes"]["ome"]["image-label"]["colors"][0]["rgba"][0] = 1;
-  EXPECT_NE(checksum(changed), checksum(ours));
-  changed = ours;
-  changed["attributes"]["ome"].erase("image-label");
-  EXPECT_NE(checksum(changed), checksum(ours));
+  const auto checksum = [](const ImageMetadata& of) {
+    return metadata_checksum(to_json(of), std::vector<std::string>{"{}"}, "file");
+  };
+  const std::uint32_t before = checksum(image);
+  image.labels->front().name = "spleen";
+  EXPECT_EQ(checksum(image), before);
 }
 
 TEST(LabelMetadata, NamesInTheGroup) {

@@ -306,3 +306,24 @@ def test_stores_behind_urls(store, server):
         isobrick.open(f"{server}/nothing.zarr")
     with pytest.raises(isobrick.UsageError, match="nothing can be written to a URL"):
         isobrick.index(url, "octree")
+
+
+def test_values_at_points(tmp_path):
+    z, y, x = np.mgrid[:20, :30, :40].astype("float32")
+    field = x + 2 * y - z
+    path = tmp_path / "linear.zarr"
+    isobrick.convert(field, path, spacing=(0.5, 1, 2), origin=(10, 0, 0), unit="mm", brick=16)
+    volume = isobrick.open(path)
+    points = np.random.default_rng(1).uniform((10, 0, 0), (29.5, 29, 38), (1000, 3))
+    expected = (points[:, 0] - 10) / 0.5 + 2 * points[:, 1] - points[:, 2] / 2
+    values = volume.sample(points)
+    assert values.dtype == np.float32
+    assert np.allclose(values, expected, atol=1e-3)
+    assert np.array_equal(volume.sample(points, memory="1M", threads=1), values)
+    assert np.allclose(volume.sample(points / 10, unit="cm"), expected, atol=1e-3)
+    assert np.isnan(volume.sample([[9, 0, 0], [np.nan, 0, 0]])).all()
+    mesh = volume.extract(30)
+    assert np.allclose(volume.sample(mesh), 30, atol=1e-3)
+    for points in ([1, 2, 3], [[1, 2]], np.zeros((2, 3, 1))):
+        with pytest.raises(ValueError, match="rows"):
+            volume.sample(points)
