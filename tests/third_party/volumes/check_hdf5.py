@@ -37,6 +37,7 @@ def check(state):
         file["spaced"] = half
         file["spaced"].attrs["element_size_um"] = [3, 0.5, 0.25]
         file["long"] = half.astype("i8")
+        file["huge"] = half.astype("i8") + (2**60 + 1)
         file["outside"] = h5py.ExternalLink("/etc/passwd", "x")
         layout = h5py.VirtualLayout((5, 6, 7), "f2")
         layout[:] = h5py.VirtualSource("other.h5", "half", (5, 6, 7))
@@ -54,7 +55,8 @@ def check(state):
     state.refused("labelled", f"{path}:/labelled", "3 channels", "--channel 0")
     state.refused("several", path, "datasets", ":/NAME", "/half")
     state.refused("nothing", f"{path}:/nothing", "nothing")
-    state.refused("long", f"{path}:/long", "integers of 8 bytes")
+    state.same("long", f"{path}:/long", half.astype("i8").astype("f8"))
+    state.refused("huge", f"{path}:/huge", "is no float64 exactly")
     state.refused("external link", f"{path}:/outside", "outside")
     state.refused("virtual", f"{path}:/virtual", "virtual")
     for name in ("lzf", "lzf_all"):
