@@ -63,6 +63,13 @@ void note_taken(const std::string& name) {
   taken.names.push_back(name);
 }
 
+/// Whether this process took the name.
+bool is_taken(const fs::path& path) {
+  TakenNames& taken = taken_names();
+  const std::lock_guard lock(taken.mutex);
+  return std::find(taken.names.begin(), taken.names.end(), path.string()) != taken.names.end();
+}
+
 /// Locks what was just created; false when somebody took it for a leftover in between. Where a
 /// file system has no locks nobody can take it.
 bool keep(const UniqueFd& fd) {
@@ -135,6 +142,8 @@ Temporary create_temporary_folder(const std::string& path) {
 bool remove_leftovers(const std::string& path, bool whole_folders) {
   const fs::path output(path);
   const fs::path folder = output.has_parent_path() ? output.parent_path() : fs::path(".");
+  // In a folder of this process nothing is left of others, and there may be many files to list.
+  if (is_taken(folder)) return false;
   const std::string name = output.filename().string();
   bool any = false;
   try {
