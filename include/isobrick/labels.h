@@ -82,8 +82,8 @@ struct LabelReport {
 /// objects end half a sample beyond their last one.
 ///
 /// Each mesh is a closed manifold and depends on the volume, the level and the region alone, not
-/// on the other labels that are chosen. Memory grows with the number of labels, 64 bytes each, and
-/// not with the meshes, which wait in a scratch file.
+/// on the other labels that are chosen. Memory grows with the number of labels, by 400 bytes each
+/// at most, and not with the meshes, which wait in a scratch file.
 ///
 /// Samples must be whole numbers, at most 2⁵³. NaN has no label. Calls `visit` with the labels in
 /// about ascending order, after the pass. Throws UsageError for a level, region or range of labels
