@@ -11,7 +11,6 @@
 #include <nlohmann/json.hpp>
 
 #include <isobrick/error.h>
-#include "core/stopwatch.h"
 #include "io/bytes/folder_output.h"
 #include "io/bytes/output_file.h"
 #include "io/bytes/output_guard.h"
@@ -145,9 +144,8 @@ class LabelWriter {
                                                         .threads = 1,
                                                         .memory = plan_.mesh_bytes});
     ordered_json entry{{"label", mesh.label()}};
-    if (const LabelProperties* properties = find_properties(mesh.label())) {
+    if (const LabelProperties* properties = find_properties(mesh.label()))
       add_properties(entry, *properties);
-    }
     entry["file"] = name;
     MeshSize size = mesh.size();
     if (filter_.any()) {

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <mutex>
 #include <stop_token>
 
 #include <isobrick/labels.h>

@@ -35,11 +35,6 @@ const std::byte* take(const std::byte* from, std::size_t count, std::vector<T>& 
   return from + count * sizeof(T);
 }
 
-/// FlatMap has no room for the key ~0, which is the label −1; no label is as small as INT64_MIN.
-std::uint64_t key_of(std::int64_t label) {
-  return label == -1 ? std::uint64_t{1} << 63 : static_cast<std::uint64_t>(label);
-}
-
 }  // namespace
 
 std::uint64_t LabelSpool::max_packed_bytes() {
@@ -75,7 +70,7 @@ void LabelSpool::append(Int3 tile, std::span<const std::byte> packed) {
     const auto items = packed.subspan(sizeof header, header.item_bytes());
     packed = packed.subspan(sizeof header + items.size());
 
-    const auto [chain, is_new] = chain_of_.insert(key_of(header.label));
+    const auto [chain, is_new] = chain_of_.insert(label_key(header.label));
     if (is_new)
       chain = {.label = header.label, .last = kNoPiece, .first_tile = tile, .last_tile = tile};
     header.previous = chain.last;

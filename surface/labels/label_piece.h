@@ -46,6 +46,12 @@ struct ForeignVertex {
 /// count, those of the foreign ones.
 using LabelQuad = std::array<std::uint32_t, 4>;
 
+/// The key of a label in a FlatMap, which has no room for ~0, the label −1. No label is as small as
+/// the number in its place.
+constexpr std::uint64_t label_key(std::int64_t label) {
+  return label == -1 ? std::uint64_t{1} << 63 : static_cast<std::uint64_t>(label);
+}
+
 /// What a tile has of one label.
 struct LabelPiece {
   std::int64_t label = 0;

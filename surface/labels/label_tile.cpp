@@ -120,9 +120,7 @@ void LabelTile::read(const TileSamples& samples, ScalarType type, Int3 tile, Box
 }
 
 LabelTile::Id LabelTile::id_of(std::int64_t label) {
-  // The map's free key is that of −1, which is looked up as the smallest number instead.
-  const auto key = label == -1 ? std::uint64_t{1} << 63 : static_cast<std::uint64_t>(label);
-  const auto [id, is_new] = id_of_.insert(key);
+  const auto [id, is_new] = id_of_.insert(label_key(label));
   if (is_new) {
     if (labels_.size() > std::numeric_limits<Id>::max())
       throw Error("more than 65,535 labels lie within 64 samples: this is no label image");

@@ -259,6 +259,37 @@ TEST_F(Labels, SmoothMeshesDependOnNothingElseEither) {
   }
 }
 
+TEST_F(Labels, BordersOfTilesDoNotShowInSmoothMeshes) {
+  // The same objects, far from the border, with other tiles around them.
+  const Field<std::uint8_t> all = cells<std::uint8_t>({60, 60, 60}, 20, 15);
+  const auto objects = [&](Index shift) {
+    const Box3 inner{{4, 4, 4}, {56, 56, 56}};
+    return Field<std::uint8_t>(all.extent + Int3{shift, shift, shift}, [&](Int3 p) {
+      const Int3 q = p - Int3{shift, shift, shift};
+      return inner.contains(q) ? static_cast<double>(all.at(q)) : 0.0;
+    });
+  };
+  const auto sorted = [](const Mesh& mesh, float shift) {
+    std::vector<std::array<long, 3>> rounded;
+    for (const Vec3f& p : mesh.positions)
+      rounded.push_back({std::lround((p.x - shift) * 1000), std::lround((p.y - shift) * 1000),
+                         std::lround((p.z - shift) * 1000)});
+    std::sort(rounded.begin(), rounded.end());
+    return rounded;
+  };
+  const Meshes meshes = meshes_of(store(objects(0)), {.smooth = 6});
+  const Meshes shifted = meshes_of(store(objects(13)), {.smooth = 6});
+  ASSERT_EQ(meshes.size(), shifted.size());
+  for (const auto& [label, mesh] : meshes) {
+    const auto expected = sorted(mesh, 0), moved = sorted(shifted.at(label), 13);
+    ASSERT_EQ(expected.size(), moved.size());
+    std::size_t far = 0;  // what lies between two numbers may be rounded to either
+    for (std::size_t i = 0; i < moved.size(); ++i)
+      far += !std::binary_search(expected.begin(), expected.end(), moved[i]);
+    EXPECT_LT(far, 1 + moved.size() / 50) << label;
+  }
+}
+
 TEST_F(Labels, SmoothingMovesPointsWithinTheirCells) {
   const Int3 extent{70, 70, 70};
   const Field<std::uint8_t> ball(extent, [](Int3 p) {
