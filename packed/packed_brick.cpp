@@ -1,0 +1,110 @@
+#include "packed/packed_brick.h"
+
+#include <algorithm>
+#include <cstring>
+
+#include <isobrick/error.h>
+#include <isobrick/pod_buffer.h>
+#include "core/copy_box.h"
+#include "packed/packed_blocks.h"
+#include "packed/packed_layout.h"
+#include "packed/palette.h"
+
+namespace isobrick::inline v0 {
+namespace {
+
+using packed::kBlock;
+using packed::kEdge;
+
+/// Calls f(number, first sample) of each block of a brick, x fastest.
+template <class F>
+void for_each_block(Int3 extent, const F& f) {
+  const Int3 blocks = packed::blocks_of(extent);
+  std::size_t number = 0;
+  for (Index z = 0; z < blocks.z; ++z)
+    for (Index y = 0; y < blocks.y; ++y)
+      for (Index x = 0; x < blocks.x; ++x) f(number++, Int3{x, y, z} * Index{kEdge});
+}
+
+/// A block of samples; where it reaches beyond the brick the last ones are repeated.
+void gather(Int3 extent, const std::byte* samples, std::size_t bytes, Int3 first, std::byte* to) {
+  const auto inside = static_cast<std::size_t>(std::min<Index>(kEdge, extent.x - first.x));
+  for (Index z = 0; z < kEdge; ++z)
+    for (Index y = 0; y < kEdge; ++y, to += kEdge * bytes) {
+      const Int3 row{first.x, std::min(first.y + y, extent.y - 1),
+                     std::min(first.z + z, extent.z - 1)};
+      const std::byte* const from =
+          samples + static_cast<std::size_t>(linear_index(row, extent)) * bytes;
+      std::memcpy(to, from, inside * bytes);
+      for (std::size_t x = inside; x < kEdge; ++x)
+        std::memcpy(to + x * bytes, from + (inside - 1) * bytes, bytes);
+    }
+}
+
+std::vector<std::byte> pack_as(packed::BlockKind kind, Int3 extent, const std::byte* samples,
+                               std::span<const std::byte> palette, std::size_t entries) {
+  const std::size_t table = packed::table_bytes(extent);
+  thread_local PodBuffer<std::byte> buffer;
+  buffer.resize(palette.size() + packed::max_packed_bytes(extent, kind.code_bytes));
+  const packed::BrickHeader header{.code_bytes = static_cast<std::uint8_t>(kind.code_bytes),
+                                   .palette = static_cast<std::uint16_t>(entries)};
+  std::memcpy(buffer.data(), &header, sizeof header);
+  std::copy(palette.begin(), palette.end(), buffer.data() + table);
+  std::byte* const blocks = buffer.data() + table + palette.size();
+  std::size_t size = 0;
+  alignas(64) std::byte block[kBlock * sizeof(std::uint64_t)];
+  for_each_block(extent, [&](std::size_t number, Int3 first) {
+    gather(extent, samples, kind.code_bytes, first, block);
+    size += packed::pack_block(kind, block, reinterpret_cast<std::uint8_t*>(blocks + size));
+    const auto end = static_cast<std::uint32_t>(size);
+    std::memcpy(buffer.data() + sizeof header + number * sizeof end, &end, sizeof end);
+  });
+  return {buffer.data(), blocks + size};
+}
+
+/// Unpacks the blocks of a brick; those that reach beyond it by way of a block of their own.
+void unpack_blocks(const packed::BrickLayout& layout, packed::BlockKind kind, Int3 extent,
+                   std::byte* samples) {
+  const std::size_t bytes = kind.code_bytes;
+  alignas(64) std::byte block[kBlock * sizeof(std::uint64_t)];
+  for_each_block(extent, [&](std::size_t number, Int3 first) {
+    const Box3 full{first, first + Int3{kEdge, kEdge, kEdge}};
+    const BoxSamples<std::byte> to{samples, {{}, extent}};
+    const bool whole = full.hi.x <= extent.x && full.hi.y <= extent.y && full.hi.z <= extent.z;
+    const bool good =
+        whole ? packed::unpack_block(kind, layout.block(number), to.at(first, bytes), extent.x,
+                                     extent.x * extent.y)
+              : packed::unpack_block(kind, layout.block(number), block, kEdge, kEdge * kEdge);
+    if (!good) throw DamageError(packed::damaged_block(number));
+    if (!whole) copy_box({block, full}, to, intersect(full, to.box), bytes);
+  });
+}
+
+}  // namespace
+
+std::vector<std::byte> pack_brick(ScalarType type, Int3 extent,
+                                  std::span<const std::byte> samples) {
+  if (const auto palette = packed::find_palette(type, samples))
+    return pack_as({1, false}, extent, palette->numbers.data(), palette->values, palette->entries);
+  return pack_as({size_of(type), is_floating(type)}, extent, samples.data(), {}, 0);
+}
+
+std::size_t packed_brick_memory(std::size_t brick_bytes) {
+  // What pack_brick() writes to, and the numbers of a palette; blocks reach beyond bricks whose
+  // edges are no multiples of theirs.
+  return 4 * brick_bytes;
+}
+
+void unpack_brick(ScalarType type, Int3 extent, std::span<const std::byte> packed,
+                  std::span<std::byte> samples) {
+  const packed::BrickLayout layout(type, extent, packed);
+  if (layout.entries() == 0)
+    return unpack_blocks(layout, {size_of(type), is_floating(type)}, extent, samples.data());
+  thread_local PodBuffer<std::byte> numbers;
+  numbers.resize(static_cast<std::size_t>(volume(extent)));
+  unpack_blocks(layout, {1, false}, extent, numbers.data());
+  packed::look_up(layout.palette(), layout.entries(), {numbers.data(), numbers.size()},
+                  samples.data());
+}
+
+}  // namespace isobrick

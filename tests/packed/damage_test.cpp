@@ -1,0 +1,95 @@
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include <isobrick/error.h>
+#include "packed/packed_brick.h"
+#include "tests/packed/fields.h"
+
+namespace isobrick::test {
+namespace {
+
+constexpr Int3 kExtent{20, 16, 18};
+
+/// A copy of exactly as many bytes, so that a sanitizer sees what lies beyond; the samples too.
+void unpack_copy(ScalarType type, std::span<const std::byte> packed) {
+  const std::vector<std::byte> copy(packed.begin(), packed.end());
+  std::vector<std::byte> samples(static_cast<std::size_t>(volume(kExtent)) * size_of(type));
+  unpack_brick(type, kExtent, copy, samples);
+}
+
+/// Whether it is refused; other samples are possible, for the checksum is not the codec's.
+bool refused(ScalarType type, std::span<const std::byte> packed) {
+  try {
+    unpack_copy(type, packed);
+    return false;
+  } catch (const DamageError& e) {
+    EXPECT_FALSE(std::string(e.what()).empty());
+    return true;
+  }
+}
+
+class PackedDamage : public ::testing::TestWithParam<std::tuple<ScalarType, std::string>> {
+ protected:
+  ScalarType type() const { return std::get<0>(GetParam()); }
+  std::vector<std::byte> packed() const {
+    return pack_brick(type(), kExtent, make_brick(type(), kExtent, std::get<1>(GetParam())));
+  }
+};
+
+TEST_P(PackedDamage, EveryBitFlippedInTurn) {
+  std::vector<std::byte> bytes = packed();
+  // Of long ones all of the beginning, where blocks, palettes and heads lie, and some of the rest.
+  const std::size_t step = bytes.size() > 6000 ? 7 : 1;
+  for (std::size_t i = 0; i < bytes.size(); i += i < 800 ? 1 : step)
+    for (int bit = 0; bit < 8; ++bit) {
+      bytes[i] ^= static_cast<std::byte>(1 << bit);
+      refused(type(), bytes);
+      bytes[i] ^= static_cast<std::byte>(1 << bit);
+    }
+}
+
+TEST_P(PackedDamage, TruncatedAndExtended) {
+  const std::vector<std::byte> bytes = packed();
+  for (std::size_t size = 0; size < bytes.size(); size += size < 800 ? 1 : 13)
+    EXPECT_TRUE(refused(type(), std::span(bytes).first(size))) << size;
+  std::vector<std::byte> longer = bytes;
+  longer.push_back({});
+  EXPECT_TRUE(refused(type(), longer));
+}
+
+TEST_P(PackedDamage, BytesOfChance) {
+  std::mt19937 random(7);
+  const std::vector<std::byte> whole = packed();
+  for (int round = 0; round < 300; ++round) {
+    std::vector<std::byte> bytes = whole;
+    for (int change = 0; change < 6; ++change)
+      bytes[random() % bytes.size()] = static_cast<std::byte>(random());
+    const std::size_t from = random() % bytes.size(), to = random() % bytes.size();
+    bytes[to] = bytes[from];
+    refused(type(), bytes);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Types, PackedDamage,
+                         ::testing::Combine(::testing::Values(ScalarType::u8, ScalarType::i16,
+                                                              ScalarType::f32, ScalarType::f64),
+                                            ::testing::Values("smooth", "noisy", "sparse", "labels",
+                                                              "extremes")),
+                         [](const auto& test) {
+                           return std::string(zarr_name(std::get<0>(test.param))) + "_" +
+                                  std::get<1>(test.param);
+                         });
+
+TEST(Packed, BricksOfAnotherTypeOrShapeAreRefused) {
+  const auto bytes =
+      pack_brick(ScalarType::u16, kExtent, make_brick(ScalarType::u16, kExtent, "noisy"));
+  std::vector<std::byte> samples(static_cast<std::size_t>(volume(kExtent)) * 4);
+  EXPECT_THROW(unpack_brick(ScalarType::f32, kExtent, bytes, samples), DamageError);
+  EXPECT_THROW(unpack_brick(ScalarType::u8, kExtent, bytes, samples), DamageError);
+  EXPECT_THROW(unpack_brick(ScalarType::u16, {20, 16, 34}, bytes, samples), DamageError);
+  EXPECT_THROW(unpack_brick(ScalarType::u16, {16, 16, 16}, bytes, samples), DamageError);
+}
+
+}  // namespace
+}  // namespace isobrick::test
