@@ -6,6 +6,7 @@
 #include <string_view>
 #include <vector>
 
+#include <isobrick/brick_codec.h>
 #include <isobrick/downsampling.h>
 #include <isobrick/image_metadata.h>
 #include <isobrick/level_info.h>
@@ -20,7 +21,8 @@ struct StoreLayout {
   std::vector<Int3> factors;  ///< of each level but the last: 1 or 2 an axis, to the next one
   Downsampling downsampling = Downsampling::mean;  ///< what makes the coarser levels
   OmeVersion ome = OmeVersion::v05;                ///< in 0.4 every shard is one brick
-  std::optional<int> zstd_level = 3;
+  BrickCodec codec = BrickCodec::zstd;
+  int zstd_level = 3;
   double fill_value = 0;
   bool may_have_nan = false;
   std::string name;
@@ -28,9 +30,7 @@ struct StoreLayout {
   std::string grid_name;             ///< of the OpenVDB grid, or empty
   std::optional<LabelTable> labels;  ///< as VolumeInfo::labels
 
-  CodecChain codecs() const {
-    return ome == OmeVersion::v04 ? CodecChain::ours_v2(zstd_level) : CodecChain::ours(zstd_level);
-  }
+  CodecChain codecs() const { return CodecChain::of(codec, zstd_level, ome == OmeVersion::v04); }
 };
 
 /// Throws UsageError or Error for a layout that no store can have.

@@ -422,7 +422,7 @@ std::uint32_t StoreReader::Impl::read(int level, Int3 b, const Place& place, std
     bytes_read += place.size;
     brick_bytes_read += place.size;
     read_ticks += (end_of_read - start).count();
-    decode_bytes(array.codecs, array.stored_bytes(), encoded, to);
+    decode_brick(array.codecs, lattice(level), array.stored_bytes(), encoded, to);
     brick_bytes_decoded += decoded;
     decode_ticks += (Clock::now() - end_of_read).count();
   } catch (const DamageError& e) {

@@ -221,8 +221,15 @@ void add_store_options(CLI::App* app, ConvertOptions& options) {
              [](const std::string& text) { return parse_whole(text, 16, 1 << 20); },
              {"--shard", "N", "Samples along each edge of a shard, cut to a multiple of the brick",
               "512; in thin volumes as many bricks in longer shards"});
-  add_parsed(app, options.zstd_level, parse_codec,
-             {"--codec", "zstd:LEVEL|none", "Compression of bricks", "zstd:3"});
+  add_text(
+      app,
+      {"--codec", "zstd:LEVEL|packed|none",
+       "Compression of bricks; packed: decoded many times faster, but by Isobrick alone", "zstd:3"},
+      [&options](const std::string& text) {
+        const Compression compression = parse_codec(text);
+        options.codec = compression.codec;
+        options.zstd_level = compression.zstd_level;
+      });
   add_parsed(app, options.levels, parse_levels,
              {"--levels", "auto|N", "Levels of the pyramid; auto: until one brick holds the last",
               "auto"});

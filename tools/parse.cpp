@@ -168,13 +168,14 @@ ByteOrder parse_byte_order(std::string_view text) {
   throw UsageError(fmt::format("'{}' is no byte order; it is little or big", text));
 }
 
-std::optional<int> parse_codec(std::string_view text) {
+Compression parse_codec(std::string_view text) {
   constexpr std::string_view zstd = "zstd";
-  if (text == "none") return std::nullopt;
-  if (text == zstd) return 3;
+  if (text == "none") return {BrickCodec::none};
+  if (text == "packed") return {BrickCodec::packed};
+  if (text == zstd) return {};
   if (!text.starts_with("zstd:"))
-    throw UsageError(fmt::format("unknown codec '{}'; it is zstd:LEVEL or none", text));
-  return parse_int(text.substr(zstd.size() + 1), 1, 22);
+    throw UsageError(fmt::format("unknown codec '{}'; it is zstd:LEVEL, packed or none", text));
+  return {BrickCodec::zstd, parse_int(text.substr(zstd.size() + 1), 1, 22)};
 }
 
 std::optional<int> parse_levels(std::string_view text) {

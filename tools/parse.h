@@ -6,6 +6,7 @@
 #include <string>
 #include <string_view>
 
+#include <isobrick/brick_codec.h>
 #include <isobrick/downsampling.h>
 #include <isobrick/extract.h>
 #include <isobrick/open_source.h>
@@ -80,8 +81,14 @@ ScalarType parse_type(std::string_view text);
 /// "little" or "big".
 ByteOrder parse_byte_order(std::string_view text);
 
-/// "none" (nothing), "zstd" or "zstd:LEVEL".
-std::optional<int> parse_codec(std::string_view text);
+/// The compression of bricks.
+struct Compression {
+  BrickCodec codec = BrickCodec::zstd;
+  int zstd_level = 3;
+};
+
+/// "none", "packed", "zstd" or "zstd:LEVEL".
+Compression parse_codec(std::string_view text);
 
 /// "auto" (nothing) or a number of levels.
 std::optional<int> parse_levels(std::string_view text);

@@ -9,6 +9,7 @@
 #include <isobrick/error.h>
 #include "bricks/zarr/json_reader.h"
 #include "bricks/zarr/shard_index.h"
+#include "packed/packed_format.h"
 
 namespace isobrick::inline v0 {
 namespace {
@@ -17,6 +18,8 @@ using Json = nlohmann::ordered_json;
 
 constexpr std::size_t kMaxDimensions = 8;
 constexpr std::size_t kMaxCodecs = 8;
+/// A name with a prefix of its own, as Zarr 3 wants for codecs that its registry lacks.
+constexpr const char* kPackedName = "isobrick.packed";
 
 Json named(const char* name, Json configuration) {
   return {{"name", name}, {"configuration", std::move(configuration)}};
@@ -24,7 +27,10 @@ Json named(const char* name, Json configuration) {
 
 Json codec_list(const CodecChain& chain) {
   Json list = Json::array();
-  list.push_back(named("bytes", {{"endian", chain.big_endian ? "big" : "little"}}));
+  if (chain.packed)
+    list.push_back(named(kPackedName, {{"version", packed::kVersion}}));
+  else
+    list.push_back(named("bytes", {{"endian", chain.big_endian ? "big" : "little"}}));
   for (const ByteCodec step : chain.steps) {
     if (step == ByteCodec::zstd)
       list.push_back(named("zstd", {{"level", chain.zstd_level}, {"checksum", false}}));
@@ -161,6 +167,13 @@ std::optional<ByteCodec> byte_codec(std::string_view name) {
   return std::nullopt;
 }
 
+void check_packed_version(const JsonReader& codec) {
+  const Index version = codec.at("configuration").at("version").integer();
+  if (version != packed::kVersion)
+    codec.unsupported(fmt::format("version {} of '{}' is not supported, only {}", version,
+                                  kPackedName, packed::kVersion));
+}
+
 CodecChain parse_chain(const JsonReader& codecs, ScalarType type) {
   CodecChain chain;
   const std::size_t count = codecs.array_size();
@@ -168,7 +181,10 @@ CodecChain parse_chain(const JsonReader& codecs, ScalarType type) {
   for (std::size_t i = 0; i < count; ++i) {
     const JsonReader codec = codecs.at(i);
     const std::string name = codec_name(codec);
-    if (i == 0) {
+    if (i == 0 && name == kPackedName) {
+      check_packed_version(codec);
+      chain.packed = true;
+    } else if (i == 0) {
       if (name != "bytes") codec.unsupported(fmt::format("codec '{}' is not supported here", name));
       if (codec.has("configuration") && codec.at("configuration").has("endian")) {
         const std::string endian = codec.at("configuration").string_at("endian");
@@ -191,7 +207,19 @@ CodecChain parse_chain(const JsonReader& codecs, ScalarType type) {
       codec.unsupported(fmt::format("codec '{}' is not supported", name));
     }
   }
+  if (chain.packed && chain.steps != std::vector{ByteCodec::crc32c})
+    codecs.unsupported(fmt::format("'{}' must be followed by crc32c alone", kPackedName));
   return chain;
+}
+
+/// Bricks are packed along the last three axes.
+void check_packed_shape(const JsonReader& json, const ArrayMetadata& array) {
+  if (!array.codecs.packed) return;
+  const std::vector<Index>& brick = array.sharding ? array.sharding->brick : array.chunk;
+  for (std::size_t i = 0; i + 3 < brick.size(); ++i)
+    if (brick[i] != 1) json.unsupported("packed bricks of more than three axes are not supported");
+  if (array.wide || brick.size() < 3)
+    json.unsupported("only three axes of one of our own types are packed");
 }
 
 void parse_sharding(const JsonReader& codec, ArrayMetadata& array) {
@@ -209,7 +237,7 @@ void parse_sharding(const JsonReader& codec, ArrayMetadata& array) {
   array.codecs = parse_chain(configuration.at("codecs"), array.type);
   const JsonReader index = configuration.at("index_codecs");
   const CodecChain chain = parse_chain(index, ScalarType::f64);
-  if (chain.big_endian || chain.steps.size() > 1 ||
+  if (chain.packed || chain.big_endian || chain.steps.size() > 1 ||
       (chain.steps.size() == 1 && chain.steps[0] != ByteCodec::crc32c))
     index.unsupported("only little-endian shard indices with or without crc32c are supported");
   sharding.index_has_crc = !chain.steps.empty();
@@ -327,6 +355,7 @@ ArrayMetadata parse_array_metadata(std::string_view text, const std::string& whe
     array.codecs = parse_chain(codecs, array.type);
     check_bytes(codecs, array.chunk, size_of(array.type));
   }
+  check_packed_shape(codecs, array);
   if (json.has("dimension_names") && json.raw()["dimension_names"].is_array()) {
     const JsonReader names = json.at("dimension_names");
     for (std::size_t i = 0; i < names.array_size(); ++i)

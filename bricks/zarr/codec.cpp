@@ -16,6 +16,7 @@
 #include <isobrick/error.h>
 #include <isobrick/pod_buffer.h>
 #include "io/bytes/byte_order.h"
+#include "packed/packed_brick.h"
 
 namespace isobrick::inline v0 {
 namespace {
@@ -93,7 +94,15 @@ CodecChain CodecChain::ours_v2(std::optional<int> zstd_level) {
   return chain;
 }
 
+CodecChain CodecChain::of(BrickCodec codec, int zstd_level, bool zarr_v2) {
+  const auto level = codec == BrickCodec::zstd ? std::optional(zstd_level) : std::nullopt;
+  CodecChain chain = zarr_v2 ? ours_v2(level) : ours(level);
+  chain.packed = codec == BrickCodec::packed;
+  return chain;
+}
+
 std::string CodecChain::name() const {
+  if (packed) return "packed";
   for (const ByteCodec step : steps) {
     if (step == ByteCodec::zstd) return fmt::format("zstd:{}", zstd_level);
     if (step != ByteCodec::crc32c) return std::string(name_of(step));
@@ -170,9 +179,10 @@ void pad_brick(const Lattice& lattice, Int3 b, double fill_value, std::byte* bri
   }
 }
 
-std::size_t encoder_memory(std::optional<int> zstd_level, std::size_t brick_bytes) {
-  if (!zstd_level) return 0;
-  return ZSTD_estimateCCtxSize_usingCParams(ZSTD_getCParams(*zstd_level, brick_bytes, 0));
+std::size_t encoder_memory(const CodecChain& chain, std::size_t brick_bytes) {
+  if (chain.packed) return packed_brick_memory(brick_bytes);
+  if (chain.steps.empty() || chain.steps.front() != ByteCodec::zstd) return 0;
+  return ZSTD_estimateCCtxSize_usingCParams(ZSTD_getCParams(chain.zstd_level, brick_bytes, 0));
 }
 
 std::vector<std::byte> encode_bytes(const CodecChain& chain, std::span<const std::byte> bytes) {
@@ -196,11 +206,14 @@ std::vector<std::byte> encode_bytes(const CodecChain& chain, std::span<const std
   return result;
 }
 
-std::optional<std::vector<std::byte>> encode_brick(ScalarType type,
+std::optional<std::vector<std::byte>> encode_brick(const Lattice& lattice,
                                                    std::span<const std::byte> samples,
                                                    double fill_value, const CodecChain& chain) {
-  if (all_fill(type, samples, fill_value)) return std::nullopt;
-  return encode_bytes(chain, samples);
+  if (all_fill(lattice.type, samples, fill_value)) return std::nullopt;
+  if (!chain.packed) return encode_bytes(chain, samples);
+  std::vector<std::byte> packed = pack_brick(lattice.type, lattice.brick, samples);
+  append_crc(packed);
+  return packed;
 }
 
 std::uint64_t decoded_size(const CodecChain& chain, std::span<const std::byte> encoded) {
@@ -211,6 +224,12 @@ std::uint64_t decoded_size(const CodecChain& chain, std::span<const std::byte> e
   if (size == ZSTD_CONTENTSIZE_UNKNOWN || size == ZSTD_CONTENTSIZE_ERROR)
     throw DamageError("is no zstd frame that states its size");
   return size;
+}
+
+void decode_brick(const CodecChain& chain, const Lattice& lattice, std::size_t sample_bytes,
+                  std::span<const std::byte> encoded, std::span<std::byte> out) {
+  if (!chain.packed) return decode_bytes(chain, sample_bytes, encoded, out);
+  unpack_brick(lattice.type, lattice.brick, check_crc(encoded), out);
 }
 
 void decode_bytes(const CodecChain& chain, std::size_t sample_bytes,

@@ -7,16 +7,18 @@
 #include <string>
 #include <vector>
 
+#include <isobrick/brick_codec.h>
 #include <isobrick/lattice.h>
 #include "bricks/zarr/decompress.h"
 #include "core/copy_box.h"
 
 namespace isobrick::inline v0 {
 
-/// How the samples of a chunk become bytes: little or big endian, then the
-/// steps in the order of encoding.
+/// How the samples of a chunk become bytes: as they are, little or big endian, or packed; then
+/// the steps in the order of encoding.
 struct CodecChain {
   bool big_endian = false;
+  bool packed = false;  ///< see packed/packed_brick.h; then there is no endian
   std::vector<ByteCodec> steps;
   int zstd_level = 0;  ///< of the zstd step, if there is one
   /// Whether what we write has a checksum within the zstd frame; what is read has it or not.
@@ -28,7 +30,9 @@ struct CodecChain {
   static CodecChain ours(std::optional<int> zstd_level);
   /// The same for Zarr version 2, which has no crc32c: zstd with its own checksum, or nothing.
   static CodecChain ours_v2(std::optional<int> zstd_level);
-  /// "zstd:3", "blosc" or "none": how StoreInfo names a chain.
+  /// One of these; packed: samples packed → crc32c.
+  static CodecChain of(BrickCodec codec, int zstd_level, bool zarr_v2);
+  /// "zstd:3", "packed", "blosc" or "none": how StoreInfo names a chain.
   std::string name() const;
 };
 
@@ -58,22 +62,27 @@ void pad_brick(const Lattice& lattice, Int3 b, double fill_value, std::byte* bri
 
 /// Encodes a full brick (native byte order, already padded) as our stores keep
 /// it; nothing when all samples equal the fill value. Thread-safe.
-std::optional<std::vector<std::byte>> encode_brick(ScalarType type,
+std::optional<std::vector<std::byte>> encode_brick(const Lattice& lattice,
                                                    std::span<const std::byte> samples,
                                                    double fill_value, const CodecChain& chain);
 
-/// Bytes that zstd keeps for one thread to encode bricks of so many bytes.
-std::size_t encoder_memory(std::optional<int> zstd_level, std::size_t brick_bytes);
+/// Bytes that one thread keeps to encode bricks of so many bytes.
+std::size_t encoder_memory(const CodecChain& chain, std::size_t brick_bytes);
 
-/// Encodes bytes by a chain of our own making. Thread-safe.
+/// Encodes bytes by a chain of our own making that does not pack. Thread-safe.
 std::vector<std::byte> encode_bytes(const CodecChain& chain, std::span<const std::byte> bytes);
 
 /// The bytes that `encoded` decodes to, as it states itself; for chains of our own
 /// making. Throws DamageError when it does not. Nothing else is checked.
 std::uint64_t decoded_size(const CodecChain& chain, std::span<const std::byte> encoded);
 
-/// Decodes into exactly `out`, native byte order. Throws DamageError saying what
-/// is wrong, not where. Thread-safe.
+/// Decodes a full brick into `out`, native byte order; also one of an array that brick_bytes() does
+/// not measure, as its samples are stored in `sample_bytes` each, or it holds several volumes.
+/// Throws DamageError saying what is wrong, not where. Thread-safe.
+void decode_brick(const CodecChain& chain, const Lattice& lattice, std::size_t sample_bytes,
+                  std::span<const std::byte> encoded, std::span<std::byte> out);
+
+/// The same for bytes that are not packed.
 void decode_bytes(const CodecChain& chain, std::size_t sample_bytes,
                   std::span<const std::byte> encoded, std::span<std::byte> out);
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include <isobrick/api.h>
+#include <isobrick/brick_codec.h>
 #include <isobrick/downsampling.h>
 #include <isobrick/image_metadata.h>
 #include <isobrick/index_build.h>
@@ -23,8 +24,9 @@ struct ConvertOptions {
   /// Samples along each edge of a shard, a multiple of `brick`. Nothing: the same with a cube of
   /// 512.
   std::optional<Index> shard = {};
-  std::optional<int> zstd_level = 3;  ///< nothing: bricks are stored as they are
-  std::optional<int> levels = {};     ///< nothing: until one brick holds the coarsest
+  BrickCodec codec = BrickCodec::zstd;  ///< packed needs OME-Zarr 0.5
+  int zstd_level = 3;                   ///< of zstd, 1 … 22
+  std::optional<int> levels = {};       ///< nothing: until one brick holds the coarsest
   /// From a level to the next, 1 or 2 an axis: of each step in turn, the last one of all further
   /// steps. Nothing: factors_by_spacing().
   std::vector<Int3> factors = {};

@@ -52,7 +52,7 @@ PackedBrick BrickOutput::pack(Int3 brick, Box3 box, const std::byte* samples, bo
 void BrickOutput::encode(PackedBrick& packed, std::span<const std::byte> samples) const {
   if (journal_ != nullptr) packed.crc = crc32c(samples);
   if (!packed.kept)
-    packed.encoded = encode_brick(lattice_.type, samples, layout_.fill_value, layout_.codecs());
+    packed.encoded = encode_brick(lattice_, samples, layout_.fill_value, layout_.codecs());
 }
 
 PackedBrick BrickOutput::pack_constant(Int3 brick, std::uint64_t bits, bool kept) {

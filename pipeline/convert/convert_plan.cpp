@@ -133,8 +133,10 @@ void check_options(const VolumeInfo& volume, const ConvertOptions& options) {
   if (shard < brick)
     throw UsageError(
         fmt::format("shards of {}³ samples are smaller than bricks of {}³", shard, brick));
-  if (options.zstd_level && (*options.zstd_level < 1 || *options.zstd_level > 22))
-    throw UsageError(fmt::format("zstd level {}: 1 to 22 are possible", *options.zstd_level));
+  if (options.zstd_level < 1 || options.zstd_level > 22)
+    throw UsageError(fmt::format("zstd level {}: 1 to 22 are possible", options.zstd_level));
+  if (options.codec == BrickCodec::packed && options.ome == OmeVersion::v04)
+    throw UsageError("the codec 'packed' needs OME-Zarr 0.5: 0.4 has no name for it");
   if (options.threads < 0) throw UsageError(fmt::format("{} threads", options.threads));
   if (options.levels && (*options.levels < 1 || *options.levels > kMaxLevels))
     throw UsageError(fmt::format("{} levels: 1 to {} are possible", *options.levels, kMaxLevels));
@@ -150,6 +152,7 @@ void check_options(const VolumeInfo& volume, const ConvertOptions& options) {
 StoreLayout plan_layout(const VolumeInfo& volume, const ConvertOptions& options, bool sparse) {
   check_options(volume, options);
   StoreLayout layout;
+  layout.codec = options.codec;
   layout.zstd_level = options.zstd_level;
   layout.fill_value = volume.fill_value;
   layout.grid_class = volume.grid_class;
@@ -199,7 +202,7 @@ std::size_t ConvertPlan::encoding_bytes() const {
   const std::size_t brick = finest.brick_bytes();
   return kProgramBytes + source_bytes_ + value_counts_bytes(finest.type, threads_) +
          static_cast<std::size_t>(threads_) *
-             (2 * brick + encoder_memory(layout_.zstd_level, brick)) +
+             (2 * brick + encoder_memory(layout_.codecs(), brick)) +
          static_cast<std::size_t>(bricks_in_flight_) * brick;
 }
 

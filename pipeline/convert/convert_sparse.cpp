@@ -77,7 +77,7 @@ Int3 factors_of(const StoreLayout& layout, std::size_t level) {
 std::size_t working_bytes(const StoreLayout& layout, std::size_t in_flight, int threads) {
   const std::size_t brick = layout.levels.front().lattice.brick_bytes();
   return in_flight * (kChildren + 1) * brick +
-         static_cast<std::size_t>(threads) * (3 * brick + encoder_memory(layout.zstd_level, brick));
+         static_cast<std::size_t>(threads) * (3 * brick + encoder_memory(layout.codecs(), brick));
 }
 
 /// The most that the ranges of any level take.

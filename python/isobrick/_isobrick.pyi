@@ -93,10 +93,16 @@ class VolumeRequest:
     time: Optional[int]
     def set_roi(self, lo: list[Optional[int]], hi: list[Optional[int]]) -> None: ...
 
+class BrickCodec:
+    none: BrickCodec
+    zstd: BrickCodec
+    packed: BrickCodec
+
 class ConvertOptions:
     brick: Optional[int]
     shard: Optional[int]
-    zstd_level: Optional[int]
+    codec: BrickCodec
+    zstd_level: int
     levels: Optional[int]
     memory: int
     threads: int

@@ -20,9 +20,12 @@ def _convert_options(
     options = _isobrick.ConvertOptions()
     options.brick = None if brick is None else integer(brick, "brick", -(2**31), 2**31 - 1)
     options.shard = None if shard is None else integer(shard, "shard", -(2**31), 2**31 - 1)
-    options.zstd_level = (
-        None if compression is None else integer(compression, "compression", -(2**31), 2**31 - 1)
-    )
+    if compression is None:
+        options.codec = _isobrick.BrickCodec.none
+    elif compression == "packed":
+        options.codec = _isobrick.BrickCodec.packed
+    else:
+        options.zstd_level = integer(compression, "compression", -(2**31), 2**31 - 1)
     options.levels = None if levels is None else integer(levels, "levels", -(2**31), 2**31 - 1)
     if str(ome) not in ("0.4", "0.5"):
         raise UsageError(f"ome must be '0.4' or '0.5', not {ome!r}")
@@ -67,8 +70,9 @@ def convert(source, path, *, progress=None, **options):
         The store, such as "ct.zarr". It has its name once it is whole.
     brick, shard : int
         Samples along each edge of a brick, and of a shard.
-    compression : int or None
-        Level of zstd; None: samples are stored as they are.
+    compression : int, "packed" or None
+        Level of zstd; "packed": bits of differences, decoded many times faster, but only by
+        Isobrick; None: samples are stored as they are.
     levels : int
         Resolutions; by default until one brick holds the coarsest.
     downsampling : "mean", "max", "min", "mode" or "stride"

@@ -57,12 +57,18 @@ TEST(Codec, PaddingIsTheFillValue) {
   });
 }
 
+/// Samples that are no brick, as if they were one.
+Lattice brick_of(std::span<const std::byte> samples) {
+  const Int3 extent{static_cast<Index>(samples.size()), 1, 1};
+  return {extent, extent, ScalarType::u8};
+}
+
 TEST(Codec, DecodesWhatItEncodes) {
   std::vector<std::byte> samples(5000);
   for (std::size_t i = 0; i < samples.size(); ++i) samples[i] = static_cast<std::byte>(i * i >> 5);
   for (const std::optional<int> level :
        {std::optional<int>(), std::optional(1), std::optional(19)}) {
-    const auto encoded = encode_brick(ScalarType::u8, samples, 0, CodecChain::ours(level));
+    const auto encoded = encode_brick(brick_of(samples), samples, 0, CodecChain::ours(level));
     ASSERT_TRUE(encoded);
     std::vector<std::byte> decoded(samples.size());
     decode_bytes(CodecChain::ours(level), 1, *encoded, decoded);
@@ -106,7 +112,7 @@ TEST(Codec, BigEndianIsSwapped) {
 TEST(Codec, EveryTruncationIsNoticed) {
   const std::vector<std::byte> samples(4096, std::byte{3});
   for (const std::optional<int> level : {std::optional<int>(), std::optional(3)}) {
-    const auto encoded = *encode_brick(ScalarType::u8, samples, 0, CodecChain::ours(level));
+    const auto encoded = *encode_brick(brick_of(samples), samples, 0, CodecChain::ours(level));
     std::vector<std::byte> decoded(samples.size());
     for (std::size_t size = 0; size < encoded.size(); ++size)
       EXPECT_THROW(

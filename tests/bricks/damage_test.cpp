@@ -25,10 +25,11 @@ bool noticed(const std::filesystem::path& path, const Level& level) {
 }
 
 TEST(Damage, EveryFlippedByteOfAShard) {
-  for (const std::optional<int> zstd_level : {std::optional<int>(), std::optional(3)}) {
+  for (const Compression compression :
+       {Compression(std::nullopt), Compression(3), Compression(BrickCodec::packed)}) {
     const TemporaryFolder folder;
     const Level level = make_level(ScalarType::u8, {7, 5, 6}, 4, 8, 0, true);
-    write_store(folder / "a.zarr", {level}, zstd_level, 0);
+    write_store(folder / "a.zarr", {level}, compression, 0);
     const std::filesystem::path shard = folder / "a.zarr/0/c/0/0/0";
     const std::string whole = read_file(shard);
     for (std::size_t i = 0; i < whole.size(); ++i)
@@ -42,14 +43,16 @@ TEST(Damage, EveryFlippedByteOfAShard) {
 }
 
 TEST(Damage, EveryTruncationOfAShard) {
-  const TemporaryFolder folder;
-  const Level level = make_level(ScalarType::u16, {7, 5, 6}, 4, 8, 0, true);
-  write_store(folder / "a.zarr", {level}, 3, 0);
-  const std::filesystem::path shard = folder / "a.zarr/0/c/0/0/0";
-  const std::string whole = read_file(shard);
-  for (std::size_t size = 0; size < whole.size(); ++size) {
-    write_file(shard, whole.substr(0, size));
-    EXPECT_TRUE(noticed(folder / "a.zarr", level)) << size;
+  for (const Compression compression : {Compression(3), Compression(BrickCodec::packed)}) {
+    const TemporaryFolder folder;
+    const Level level = make_level(ScalarType::u16, {7, 5, 6}, 4, 8, 0, true);
+    write_store(folder / "a.zarr", {level}, compression, 0);
+    const std::filesystem::path shard = folder / "a.zarr/0/c/0/0/0";
+    const std::string whole = read_file(shard);
+    for (std::size_t size = 0; size < whole.size(); ++size) {
+      write_file(shard, whole.substr(0, size));
+      EXPECT_TRUE(noticed(folder / "a.zarr", level)) << size;
+    }
   }
 }
 

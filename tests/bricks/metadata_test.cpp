@@ -73,6 +73,26 @@ TEST(ArrayMetadata, RoundTrip) {
   EXPECT_EQ(array.chunk_key(std::array<Index, 3>{1, 2, 3}), "1.2.3");
 }
 
+TEST(ArrayMetadata, PackedBricks) {
+  ArrayMetadata array = sharded();
+  array.codecs = CodecChain::of(BrickCodec::packed, 3, false);
+  const std::string text = to_json(array);
+  EXPECT_EQ(parse_array_metadata(text, "file").codecs, array.codecs);
+  const auto refused = [&](const std::string& from, const std::string& to,
+                           const std::string& part) {
+    expect_error(false, part, [&] { parse_array_metadata(replaced(text, from, to), "file"); });
+  };
+  refused("\"version\":1", "\"version\":2", "version 2");
+  refused("isobrick.packed", "isobrick.other", "isobrick.other");
+  refused("{\"name\":\"crc32c\"}", "{\"name\":\"zstd\"}", "crc32c");
+  refused("\"float32\"", "\"float16\"", "three axes");
+  array.shape = {2, 100, 200, 300};
+  array.chunk = {2, 64, 64, 128};
+  array.sharding->brick = {2, 32, 32, 32};
+  array.dimension_names = {};
+  expect_error(false, "three axes", [&] { parse_array_metadata(to_json(array), "file"); });
+}
+
 TEST(ArrayMetadata, FillValues) {
   const auto parse = [](ScalarType type, const std::string& value) {
     ArrayMetadata array = sharded();

@@ -84,11 +84,26 @@ inline std::vector<std::byte> cut_brick(const Level& level, Int3 b, double fill)
   return brick;
 }
 
-inline StoreLayout make_layout(const std::vector<Level>& levels, std::optional<int> zstd_level,
+/// How the bricks of a store are compressed: by a level of zstd, not at all, or by another codec.
+struct Compression {
+  BrickCodec codec = BrickCodec::none;
+  int zstd_level = 3;
+
+  Compression(std::nullopt_t) {}
+  Compression(BrickCodec of) : codec(of) {}
+  Compression(int level) : codec(BrickCodec::zstd), zstd_level(level) {}
+  Compression(std::optional<int> level) {
+    if (level) *this = *level;
+  }
+  CodecChain chain() const { return CodecChain::of(codec, zstd_level, false); }
+};
+
+inline StoreLayout make_layout(const std::vector<Level>& levels, Compression compression,
                                double fill) {
   StoreLayout layout;
   for (const Level& level : levels) layout.levels.push_back(level.info());
-  layout.zstd_level = zstd_level;
+  layout.codec = compression.codec;
+  layout.zstd_level = compression.zstd_level;
   layout.fill_value = fill;
   layout.name = "test";
   return layout;
@@ -126,13 +141,13 @@ inline Int3 shards_of(const Level& level) { return ceil_div(level.lattice.extent
 
 /// Puts the bricks of one shard and finishes it.
 inline void write_shard(StoreWriter& writer, const std::vector<Level>& levels, int number, Int3 s,
-                        std::optional<int> zstd_level, double fill) {
+                        Compression compression, double fill) {
   const Level& level = levels[static_cast<std::size_t>(number)];
   const Int3 n = ceil_div(level.shard, level.lattice.brick);
   for_each_point(intersect({s * n, (s + Int3{1, 1, 1}) * n}, {{0, 0, 0}, level.lattice.bricks()}),
                  [&](Int3 b) {
-                   const auto encoded = encode_brick(level.lattice.type, cut_brick(level, b, fill),
-                                                     fill, CodecChain::ours(zstd_level));
+                   const auto encoded = encode_brick(level.lattice, cut_brick(level, b, fill), fill,
+                                                     compression.chain());
                    writer.put(number, b, encoded ? *encoded : std::vector<std::byte>());
                  });
   writer.finish_shard(number, s);
@@ -149,11 +164,11 @@ inline void write_ranges(StoreWriter& writer, const std::vector<Level>& levels) 
 }
 
 inline void write_store(const std::filesystem::path& path, const std::vector<Level>& levels,
-                        std::optional<int> zstd_level, double fill) {
-  StoreWriter writer(path, make_layout(levels, zstd_level, fill), false);
+                        Compression compression, double fill) {
+  StoreWriter writer(path, make_layout(levels, compression, fill), false);
   for (int i = 0; i < static_cast<int>(levels.size()); ++i)
     for_each_point({{0, 0, 0}, shards_of(levels[static_cast<std::size_t>(i)])},
-                   [&](Int3 s) { write_shard(writer, levels, i, s, zstd_level, fill); });
+                   [&](Int3 s) { write_shard(writer, levels, i, s, compression, fill); });
   write_ranges(writer, levels);
   writer.finish(is_floating(levels[0].lattice.type));
 }

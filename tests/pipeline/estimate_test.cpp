@@ -110,7 +110,7 @@ TEST_F(Estimate, ReadsOnlySoMuchAndIsTheSameForAnyMeans) {
         (static_cast<std::uint64_t>(p.x * 7919 + p.y * 104729 + p.z) * 0x9e3779b97f4a7c15ULL) >>
         11);
   });
-  const StoreReader reader = store(extent, samples, {.zstd_level = std::nullopt});
+  const StoreReader reader = store(extent, samples, {.codec = BrickCodec::none});
   const double middle = 0x1p52;
   const std::uint64_t before = reader.bytes_read();
   const ExtractEstimate guess = estimate(reader, {.isovalue = middle, .threads = 1}, 0);

@@ -19,7 +19,7 @@ class IndexGolden : public ::testing::Test {
   void SetUp() override {
     const std::vector<std::uint8_t> samples{10, 12, 30, 11, 11, 11, 14, 13, 12, 15, 15, 15};
     MemorySource source({3, 2, 2}, ScalarType::u8, as_bytes(samples));
-    convert_quietly(source, store_, {.zstd_level = std::nullopt, .levels = 1});
+    convert_quietly(source, store_, {.codec = BrickCodec::none, .levels = 1});
   }
 
   TemporaryFolder folder_;

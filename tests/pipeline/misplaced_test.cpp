@@ -260,15 +260,15 @@ INSTANTIATE_TEST_SUITE_P(
     ::testing::Values(Alike{"Noise", Content::noise, {.brick = 16, .shard = 32}},
                       Alike{"NoiseWithoutCodec",
                             Content::noise,
-                            {.brick = 16, .shard = 16, .zstd_level = std::nullopt}},
+                            {.brick = 16, .shard = 16, .codec = BrickCodec::none}},
                       Alike{"NoiseOme04", Content::noise, {.brick = 16, .ome = OmeVersion::v04}},
                       Alike{"NoiseOme04WithoutCodec",
                             Content::noise,
-                            {.brick = 16, .zstd_level = std::nullopt, .ome = OmeVersion::v04}},
+                            {.brick = 16, .codec = BrickCodec::none, .ome = OmeVersion::v04}},
                       Alike{"Mask", Content::mask, {.brick = 16, .shard = 32}},
                       Alike{"MaskOme04WithoutCodec",
                             Content::mask,
-                            {.brick = 16, .zstd_level = std::nullopt, .ome = OmeVersion::v04}}),
+                            {.brick = 16, .codec = BrickCodec::none, .ome = OmeVersion::v04}}),
     [](const ::testing::TestParamInfo<Alike>& test) { return std::string(test.param.name); });
 
 }  // namespace

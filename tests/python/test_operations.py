@@ -22,6 +22,8 @@ def test_arrays_become_stores(tmp_path):
         isobrick.convert(field, tmp_path / "a.zarr")
     isobrick.convert(field, tmp_path / "a.zarr", force=True, compression=None)
     assert isobrick.open(tmp_path / "a.zarr").info["codec"] == "none"
+    isobrick.convert(field, tmp_path / "a.zarr", force=True, compression="packed")
+    assert isobrick.open(tmp_path / "a.zarr").info["codec"] == "packed"
 
 
 class Lazy:

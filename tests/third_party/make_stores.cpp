@@ -14,9 +14,9 @@ void write_raw(const std::filesystem::path& path, const std::vector<std::byte>& 
 
 // A canonical NaN, as fill values and ours are: other readers may not keep payloads.
 void make_store(const std::filesystem::path& folder, const std::string& name,
-                const std::vector<Level>& levels, std::optional<int> zstd_level, double fill) {
+                const std::vector<Level>& levels, Compression compression, double fill) {
   const std::filesystem::path store = folder / (name + ".zarr");
-  write_store(store, levels, zstd_level, fill);
+  write_store(store, levels, compression, fill);
   std::string line = store.string();
   const auto add = [&](const std::string& array, const std::vector<std::byte>& bytes) {
     const std::filesystem::path raw = folder / (name + "." + std::to_string(line.size()) + ".raw");
