@@ -29,7 +29,7 @@ const std::map<std::string, Names> kMayInclude = {
     {"index", {"core"}},
     {"surface", {"core"}},
     {"stream", {"core", "bricks", "index"}},
-    {"gpu", {"core", "surface", "index"}},
+    {"gpu", {"core", "surface", "index", "packed"}},
     {"pipeline", {"core", "io/bytes", "io/volumes", "bricks", "index", "surface", "stream", "gpu"}},
     {"viewer/scene",
      {"core", "io/volumes", "bricks", "index", "surface", "stream", "gpu", "pipeline"}},

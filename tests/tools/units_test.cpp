@@ -54,9 +54,11 @@ TEST(Parse, Types) {
 }
 
 TEST(Parse, CodecAndLevels) {
-  EXPECT_EQ(parse_codec("none"), std::nullopt);
-  EXPECT_EQ(parse_codec("zstd"), 3);
-  EXPECT_EQ(parse_codec("zstd:19"), 19);
+  EXPECT_EQ(parse_codec("none").codec, BrickCodec::none);
+  EXPECT_EQ(parse_codec("packed").codec, BrickCodec::packed);
+  EXPECT_EQ(parse_codec("zstd").codec, BrickCodec::zstd);
+  EXPECT_EQ(parse_codec("zstd").zstd_level, 3);
+  EXPECT_EQ(parse_codec("zstd:19").zstd_level, 19);
   for (const char* text : {"", "gzip", "zstd:", "zstd:0", "zstd:23", "zstd3"})
     EXPECT_THROW(parse_codec(text), UsageError) << text;
   EXPECT_EQ(parse_levels("auto"), std::nullopt);

@@ -93,6 +93,15 @@ T atomicAdd(T* to, std::type_identity_t<T> value) {
   return std::atomic_ref(*to).fetch_add(value, std::memory_order_relaxed);
 }
 
+template <class T>
+T atomicMin(T* to, std::type_identity_t<T> value) {
+  std::atomic_ref word(*to);
+  T known = word.load(std::memory_order_relaxed);
+  while (value < known && !word.compare_exchange_weak(known, value, std::memory_order_relaxed)) {
+  }
+  return known;
+}
+
 inline std::uint32_t __vimin3_u16x2(std::uint32_t a, std::uint32_t b, std::uint32_t c) {
   const auto least = [&](int shift) {
     return std::min({a >> shift & 0xffffu, b >> shift & 0xffffu, c >> shift & 0xffffu}) << shift;

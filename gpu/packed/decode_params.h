@@ -1,0 +1,44 @@
+#pragma once
+
+#include <cstdint>
+
+#include "packed/packed_format.h"
+
+// What the host hands to the kernel that decodes packed bricks. Plain data, no CUDA header.
+
+namespace isobrick::inline v0::gpu {
+
+/// A packed brick whose header and table packed::BrickLayout has found good.
+struct PackedOnDevice {
+  const std::uint8_t* from;  ///< aligned to 4 bytes, and 8 bytes beyond its end can be read
+  void* to;                  ///< samples of the whole brick, aligned to 32 bytes
+  std::uint32_t palette;     ///< entries; 0: none
+};
+
+/// The bricks of a launch.
+struct DecodeParams {
+  static constexpr std::uint32_t kMax = 64;
+  PackedOnDevice bricks[kMax];
+  std::uint32_t count;
+  std::int32_t extent[3];  ///< samples of a brick
+  std::int32_t blocks[3];  ///< blocks of 16³ of a brick
+  std::uint32_t parts;     ///< blocks of threads a brick
+  std::uint32_t number;    ///< of the first brick, for `failed`
+  /// Gets the least number of a brick with a damaged block, unless it holds a lesser one.
+  std::uint32_t* failed;
+};
+
+/// All but the bricks, for bricks of `extent` samples.
+inline DecodeParams decode_params(Int3 extent) {
+  constexpr std::uint32_t kBlocksOfPart = 16;
+  const Int3 blocks = packed::blocks_of(extent);
+  DecodeParams p{};
+  for (int axis = 0; axis < 3; ++axis) {
+    p.extent[axis] = static_cast<std::int32_t>(extent[axis]);
+    p.blocks[axis] = static_cast<std::int32_t>(blocks[axis]);
+  }
+  p.parts = (static_cast<std::uint32_t>(volume(blocks)) + kBlocksOfPart - 1) / kBlocksOfPart;
+  return p;
+}
+
+}  // namespace isobrick::gpu

@@ -1,0 +1,113 @@
+#include <gtest/gtest.h>
+
+#include <cstring>
+#include <random>
+
+#include <isobrick/error.h>
+#include "packed/packed_brick.h"
+#include "packed/packed_layout.h"
+#include "tests/gpu/kernels/decode_runner.h"
+#include "tests/packed/fields.h"
+
+// The kernel that decodes packed bricks, beside the CPU's decoder.
+
+namespace isobrick::testing {
+namespace {
+
+/// Bricks as a device has them, and what the kernel makes of them.
+class Decoded {
+ public:
+  Decoded(ScalarType type, Int3 extent)
+      : type_(type), extent_(extent), params_(gpu::decode_params(extent)) {}
+
+  void add(std::span<const std::byte> packed) {
+    const packed::BrickLayout layout(type_, extent_, packed);
+    // As many bytes as may be read, so that a sanitizer sees what lies beyond.
+    auto& words = packed_.emplace_back((packed.size() + 8 + 3) / 4);
+    std::memcpy(words.data(), packed.data(), packed.size());
+    auto& samples = samples_.emplace_back(static_cast<std::size_t>(volume(extent_)));
+    params_.bricks[params_.count++] = {reinterpret_cast<const std::uint8_t*>(words.data()),
+                                       samples.data(),
+                                       static_cast<std::uint32_t>(layout.entries())};
+  }
+  void run(unsigned seed) {
+    params_.failed = &failed_;
+    params_.number = 100;
+    emulated::run_decode(type_, params_, seed);
+  }
+  /// The number of the first damaged brick.
+  std::uint32_t failed() const { return failed_; }
+  std::vector<std::byte> samples(std::size_t i) const {
+    std::vector<std::byte> bytes(static_cast<std::size_t>(volume(extent_)) * size_of(type_));
+    std::memcpy(bytes.data(), samples_[i].data(), bytes.size());
+    return bytes;
+  }
+
+ private:
+  ScalarType type_;
+  Int3 extent_;
+  gpu::DecodeParams params_;
+  std::vector<std::vector<std::uint32_t>> packed_;
+  std::vector<std::vector<std::uint64_t>> samples_;
+  std::uint32_t failed_ = ~0u;
+};
+
+class DecodeKernel : public ::testing::TestWithParam<ScalarType> {};
+
+TEST_P(DecodeKernel, FindsTheSamplesThatWerePacked) {
+  const ScalarType type = GetParam();
+  unsigned seed = 0;
+  for (const Int3 extent : {Int3{64, 32, 16}, Int3{32, 48, 20}, Int3{19, 16, 17}, Int3{1, 1, 1}}) {
+    Decoded decoded(type, extent);
+    std::vector<std::vector<std::byte>> bricks;
+    for (const std::string& field : test::kFields) {
+      bricks.push_back(test::make_brick(type, extent, field));
+      decoded.add(pack_brick(type, extent, bricks.back()));
+    }
+    decoded.run(++seed);
+    EXPECT_EQ(decoded.failed(), ~0u);
+    for (std::size_t i = 0; i < bricks.size(); ++i)
+      EXPECT_EQ(decoded.samples(i), bricks[i]) << test::kFields[i] << ' ' << extent.x;
+  }
+}
+
+// What the CPU refuses the kernel names, and what the CPU takes for other samples it does as well.
+TEST_P(DecodeKernel, RefusesWhatTheCpuRefuses) {
+  const ScalarType type = GetParam();
+  const Int3 extent{32, 16, 16};
+  std::mt19937 random(5);
+  for (const char* field : {"smooth", "noisy", "sparse", "labels"}) {
+    const auto whole = pack_brick(type, extent, test::make_brick(type, extent, field));
+    for (int round = 0; round < 40; ++round) {
+      std::vector<std::byte> bytes = whole;
+      // Half of the changes where heads and masks lie.
+      const std::size_t place =
+          random() % (round % 2 == 0 ? std::min<std::size_t>(bytes.size(), 120) : bytes.size());
+      bytes[place] ^= static_cast<std::byte>(1 << random() % 8);
+      std::vector<std::byte> expected(static_cast<std::size_t>(volume(extent)) * size_of(type));
+      bool good = true;
+      try {
+        unpack_brick(type, extent, bytes, expected);
+      } catch (const DamageError&) {
+        good = false;
+      }
+      Decoded decoded(type, extent);
+      try {
+        decoded.add(bytes);
+      } catch (const DamageError&) {
+        EXPECT_FALSE(good);
+        continue;
+      }
+      decoded.run(random());
+      EXPECT_EQ(decoded.failed(), good ? ~0u : 100u) << field << place;
+      if (!good) continue;
+      EXPECT_EQ(decoded.samples(0), expected) << field << place;
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Types, DecodeKernel, ::testing::ValuesIn(kScalarTypes),
+                         [](const auto& test) { return std::string(zarr_name(test.param)); });
+
+}  // namespace
+}  // namespace isobrick::testing
