@@ -25,11 +25,11 @@ double decode_on_device(ScalarType type, Int3 extent,
   std::size_t room = 0;
   for (const auto& brick : packed) room += room_of(brick.size());
   gpu::DeviceBuffer<std::byte> from(room * copies), to(bricks * brick_bytes);
-  gpu::DeviceBuffer<std::uint32_t> failed(1);
+  gpu::DeviceBuffer<unsigned long long> failed(1);
   // Launches of few bricks, as they come when bricks are streamed, leave most of a GPU idle.
   std::vector<gpu::Stream> streams;
   for (int i = 0; i < 8; ++i) streams.emplace_back();
-  gpu::check(cudaMemset(failed.data(), 0xff, sizeof(std::uint32_t)));
+  gpu::check(cudaMemset(failed.data(), 0xff, failed.bytes()));
   std::vector<gpu::DecodeParams> launches;
   std::byte* at = from.data();
   for (std::size_t i = 0; i < bricks; ++i) {
@@ -42,7 +42,7 @@ double decode_on_device(ScalarType type, Int3 extent,
     gpu::DecodeParams& p = launches.back();
     const isobrick::packed::BrickLayout layout(type, extent, brick);
     p.bricks[p.count++] = {reinterpret_cast<const std::uint8_t*>(at), to.data() + i * brick_bytes,
-                           static_cast<std::uint32_t>(layout.entries())};
+                           static_cast<std::uint32_t>(layout.entries()), i};
     at += room_of(brick.size());
   }
   std::vector<double> seconds;
@@ -62,9 +62,9 @@ double decode_on_device(ScalarType type, Int3 extent,
     streams[0].wait();
     if (run > 0) seconds.push_back(1e-3 * static_cast<double>(end.since(begin)));
   }
-  std::uint32_t number = 0;
+  unsigned long long number = 0;
   gpu::check(cudaMemcpy(&number, failed.data(), sizeof number, cudaMemcpyDeviceToHost));
-  if (number != ~0u) throw Error("a brick was found damaged");
+  if (number != ~0ull) throw Error("a brick was found damaged");
   std::vector<std::byte> found(brick_bytes);
   for (std::size_t i = 0; i < bricks; i += i < packed.size() ? 1 : 97) {
     gpu::check(

@@ -87,6 +87,7 @@ struct StoreReader::Impl {
   std::optional<Place> find(int level, Int3 b);
   void check_content(int level, Int3 b, const Place& place, std::uint32_t checksum);
   std::uint32_t read(int level, Int3 b, const Place& place, std::byte* out);
+  std::size_t read_packed(int level, Int3 b, const Place& place, std::span<std::byte> out);
   RangeTable ranges(int level, Box3 box, bool blocks);
   std::uint64_t shard_number(int level, Int3 s) const {
     return static_cast<std::uint64_t>(linear_index(s, at(level).grid.shards)) * 64 +
@@ -390,11 +391,42 @@ bool StoreReader::read_brick(int level, Int3 b, std::byte* out) const {
   return true;
 }
 
+bool StoreReader::is_packed(int level) const { return impl_->at(level).metadata.codecs.packed; }
+
+std::optional<std::size_t> StoreReader::read_packed(int level, Int3 b,
+                                                    std::span<std::byte> out) const {
+  const auto place = impl_->find(level, b);
+  if (!place) return std::nullopt;
+  return impl_->read_packed(level, b, *place, out);
+}
+
 std::optional<std::uint32_t> StoreReader::read_brick_unchecked(int level, Int3 b,
                                                                std::byte* out) const {
   const auto place = impl_->find_unchecked(level, b);
   if (!place) return std::nullopt;
   return impl_->read(level, b, *place, out);
+}
+
+std::size_t StoreReader::Impl::read_packed(int level, Int3 b, const Place& place,
+                                           std::span<std::byte> out) {
+  if (place.size > out.size())
+    damaged(level, b, place, fmt::format("too long for {} bytes", out.size()));
+  const std::span encoded = out.first(static_cast<std::size_t>(place.size));
+  const auto start = Clock::now();
+  place.object->read(place.offset, encoded);
+  const auto end_of_read = Clock::now();
+  bytes_read += place.size;
+  brick_bytes_read += place.size;
+  read_ticks += (end_of_read - start).count();
+  std::size_t bytes = 0;
+  try {
+    bytes = without_checksum(encoded).size();
+  } catch (const DamageError& e) {
+    damaged(level, b, place, e.what());
+  }
+  decode_ticks += (Clock::now() - end_of_read).count();
+  check_content(level, b, place, brick_checksum(at(level).metadata.codecs, encoded));
+  return bytes;
 }
 
 /// The checksum of the brick that is read.

@@ -1,9 +1,12 @@
 #include "stream/batch_decoder.h"
 
+#include <fmt/format.h>
 #include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <utility>
+
+#include <isobrick/error.h>
 
 namespace isobrick::inline v0 {
 namespace {
@@ -61,6 +64,12 @@ void BatchDecoder::wait(std::unique_lock<std::mutex>& lock, const Ready& ready) 
 }
 
 std::shared_ptr<const DecodedBatch> BatchDecoder::next() {
+  std::shared_ptr<const DecodedBatch> batch = next_decoded();
+  check_device(batch == nullptr);
+  return batch;
+}
+
+std::shared_ptr<const DecodedBatch> BatchDecoder::next_decoded() {
   Batch batch;  // an error destroys it after the lock, which its destructor takes
   std::unique_lock lock(mutex_);
   wait(lock, [&] {
@@ -186,9 +195,7 @@ void BatchDecoder::work(int thread) {
 
 void BatchDecoder::decode(int thread, DecodedBatch& batch, const std::vector<BrickLoad>& loads) {
   for (const BrickLoad& load : loads) {
-    if (reader_.read(load.brick, memory_.begin(thread, load.slot))) {
-      memory_.end(thread, load.slot);
-    } else {
+    if (!load_brick(thread, load)) {
       const std::lock_guard lock(mutex_);
       batch.bricks_->set_absent(load.brick);
     }
@@ -197,6 +204,29 @@ void BatchDecoder::decode(int thread, DecodedBatch& batch, const std::vector<Bri
   // Under the lock, or a thread that has just read the count would miss the notification.
   const std::lock_guard lock(mutex_);
   changed_.notify_all();
+}
+
+/// False when the brick is absent.
+bool BatchDecoder::load_brick(int thread, const BrickLoad& load) {
+  if (!memory_.takes_packed()) {
+    if (!reader_.read(load.brick, memory_.begin(thread, load.slot))) return false;
+    memory_.end(thread, load.slot);
+    return true;
+  }
+  const auto bytes = reader_.read_packed(load.brick, memory_.begin_packed(thread));
+  if (!bytes) return false;
+  memory_.end_packed(thread, load.slot, {load.brick, *bytes, reader_.stored_range(load.brick)});
+  return true;
+}
+
+/// What the device found wrong the processor finds as well, and names.
+void BatchDecoder::check_device(bool all) {
+  const std::optional<Int3> brick = memory_.find_damaged(all);
+  if (!brick) return;
+  std::vector<std::byte> samples(reader_.lattice().brick_bytes());
+  reader_.read(*brick, samples.data());
+  throw Error(fmt::format("brick ({}, {}, {}): the GPU decodes other samples than the processor",
+                          brick->x, brick->y, brick->z));
 }
 
 void BatchDecoder::release(DecodedBatch& batch) {

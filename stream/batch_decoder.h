@@ -93,6 +93,9 @@ class BatchDecoder {
   void grow(std::size_t count);
   void work(int thread);
   void decode(int thread, DecodedBatch& batch, const std::vector<BrickLoad>& loads);
+  std::shared_ptr<const DecodedBatch> next_decoded();
+  bool load_brick(int thread, const BrickLoad& load);
+  void check_device(bool all);
   void release(DecodedBatch& batch);
   void fail(std::exception_ptr error);
   template <class Ready>

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <limits>
 
 #include <isobrick/error.h>
 
@@ -82,6 +83,10 @@ BrickReader::BrickReader(const StoreReader& store, int level)
       tables_(kKept) {}
 
 ValueRange<double> BrickReader::stored_range(Int3 brick) const {
+  if (!store_.has_ranges(level_)) {
+    constexpr double infinity = std::numeric_limits<double>::infinity();
+    return {-infinity, infinity};
+  }
   constexpr Index n = StoreReader::kRangeChunk;
   const Int3 chunk{brick.x / n, brick.y / n, brick.z / n};
   const Int3 chunks = ceil_div(lattice_.bricks(), {n, n, n});
@@ -99,6 +104,12 @@ bool BrickReader::read(Int3 brick, std::byte* out) const {
   const bool present = store_.read_brick(level_, brick, out);
   check(brick, present ? out : nullptr);
   return present;
+}
+
+std::optional<std::size_t> BrickReader::read_packed(Int3 brick, std::span<std::byte> out) const {
+  const auto bytes = store_.read_packed(level_, brick, out);
+  if (!bytes) check(brick, nullptr);
+  return bytes;
 }
 
 void BrickReader::will_need(std::span<const Int3> bricks) const {

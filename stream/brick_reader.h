@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <span>
 
 #include <isobrick/store_reader.h>
@@ -21,6 +22,14 @@ class BrickReader {
   /// As StoreReader::read_brick. Throws DamageError, with the brick and its place, for samples
   /// outside of the range.
   bool read(Int3 brick, std::byte* out) const;
+  /// Whether bricks can be read without being decoded.
+  bool is_packed() const { return store_.is_packed(level_); }
+  /// As StoreReader::read_packed. Samples are compared with ranges by whoever decodes them:
+  /// stored_range() has those of the brick.
+  std::optional<std::size_t> read_packed(Int3 brick, std::span<std::byte> out) const;
+  /// Everything where the store has no ranges.
+  ValueRange<double> stored_range(Int3 brick) const;
+
   /// Whether will_need() can gain anything.
   bool reads_disk() const { return !store_.reads_memory(); }
   /// Whether bricks come from another machine.
@@ -30,7 +39,6 @@ class BrickReader {
 
  private:
   void check(Int3 brick, const std::byte* samples) const;
-  ValueRange<double> stored_range(Int3 brick) const;
   [[noreturn]] void fail(Int3 brick, const ValueRange<double>& stored,
                          const ValueRange<double>& found) const;
 

@@ -63,16 +63,6 @@ std::vector<std::byte> compress(std::span<const std::byte> bytes, const CodecCha
   return result;
 }
 
-std::span<const std::byte> check_crc(std::span<const std::byte> encoded) {
-  if (encoded.size() < kCrcBytes) throw DamageError("too short for a checksum");
-  const auto body = encoded.first(encoded.size() - kCrcBytes);
-  std::uint32_t stored;
-  std::memcpy(&stored, encoded.data() + body.size(), kCrcBytes);
-  if (const std::uint32_t crc = crc32c(body); crc != stored)
-    throw DamageError(fmt::format("checksum is {:08x}, must be {:08x}", crc, stored));
-  return body;
-}
-
 }  // namespace
 
 CodecChain CodecChain::ours(std::optional<int> zstd_level) {
@@ -120,6 +110,16 @@ std::uint32_t crc32c(std::span<const std::byte> bytes) {
     state = crc32_iscsi(data, static_cast<int>(part.size()), state);
   }
   return ~state;
+}
+
+std::span<const std::byte> without_checksum(std::span<const std::byte> encoded) {
+  if (encoded.size() < kCrcBytes) throw DamageError("too short for a checksum");
+  const auto body = encoded.first(encoded.size() - kCrcBytes);
+  std::uint32_t stored;
+  std::memcpy(&stored, encoded.data() + body.size(), kCrcBytes);
+  if (const std::uint32_t crc = crc32c(body); crc != stored)
+    throw DamageError(fmt::format("checksum is {:08x}, must be {:08x}", crc, stored));
+  return body;
 }
 
 std::uint64_t fill_bits(ScalarType type, double fill_value) {
@@ -229,7 +229,7 @@ std::uint64_t decoded_size(const CodecChain& chain, std::span<const std::byte> e
 void decode_brick(const CodecChain& chain, const Lattice& lattice, std::size_t sample_bytes,
                   std::span<const std::byte> encoded, std::span<std::byte> out) {
   if (!chain.packed) return decode_bytes(chain, sample_bytes, encoded, out);
-  unpack_brick(lattice.type, lattice.brick, check_crc(encoded), out);
+  unpack_brick(lattice.type, lattice.brick, without_checksum(encoded), out);
 }
 
 void decode_bytes(const CodecChain& chain, std::size_t sample_bytes,
@@ -240,7 +240,7 @@ void decode_bytes(const CodecChain& chain, std::size_t sample_bytes,
   bool in_place = false;
   for (std::size_t i = chain.steps.size(); i-- > 0;) {
     if (chain.steps[i] == ByteCodec::crc32c) {
-      current = check_crc(current);
+      current = without_checksum(current);
       continue;
     }
     if (i == 0) {

@@ -39,6 +39,9 @@ struct CodecChain {
 /// CRC-32C (Castagnoli) as Zarr stores it.
 std::uint32_t crc32c(std::span<const std::byte> bytes);
 
+/// What lies before the CRC-32C at the end. Throws DamageError where that is another.
+std::span<const std::byte> without_checksum(std::span<const std::byte> encoded);
+
 /// A decoded chunk may not be larger than this; larger ones are refused, so that
 /// broken metadata cannot take all the memory.
 inline constexpr std::uint64_t kMaxBrickBytes = std::uint64_t{1} << 31;

@@ -10,7 +10,8 @@ static_assert(sizeof(uint4) == CopyChunks::kAlign);
 
 /// A row of blocks a chunk. Each thread has four words on their way at a time, for the other end
 /// of the bus is far away.
-__global__ void __launch_bounds__(kThreads) copy_chunks(CopyChunks chunks, std::size_t words) {
+__global__ void __launch_bounds__(kThreads) copy_chunks(CopyChunks chunks) {
+  const std::size_t words = chunks.units[blockIdx.y];
   const uint4* from = static_cast<const uint4*>(chunks.from[blockIdx.y]);
   uint4* to = static_cast<uint4*>(chunks.to[blockIdx.y]);
   constexpr std::size_t step = kBlocksOfChunk * kThreads;
@@ -28,10 +29,9 @@ __global__ void __launch_bounds__(kThreads) copy_chunks(CopyChunks chunks, std::
 
 }  // namespace
 
-void launch_copy(const CopyChunks& chunks, std::size_t bytes, cudaStream_t stream) {
+void launch_copy(const CopyChunks& chunks, cudaStream_t stream) {
   if (chunks.count == 0) return;
-  copy_chunks<<<dim3(kBlocksOfChunk, chunks.count), kThreads, 0, stream>>>(
-      chunks, bytes / CopyChunks::kAlign);
+  copy_chunks<<<dim3(kBlocksOfChunk, chunks.count), kThreads, 0, stream>>>(chunks);
   check_launch("copy_chunks");
 }
 

@@ -27,6 +27,8 @@ class UploadTracker {
   /// A free buffer for `thread` to fill: the one that it filled last, which its cache holds rather
   /// than another. None while all of its buffers wait or are copied. By that thread.
   std::optional<std::size_t> begin(int thread);
+  /// The buffer that begin() gave last. By that thread.
+  std::size_t latest(int thread) const { return order_of(thread).front(); }
   /// The buffer that `thread` filled longest ago: the first to be free. By that thread.
   std::size_t oldest(int thread) const { return order_of(thread).back(); }
   /// What `thread` has filled since begin() belongs to `place`. How many bricks wait for a request

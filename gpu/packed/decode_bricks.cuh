@@ -3,8 +3,8 @@
 #include <type_traits>
 
 #include "gpu/packed/decode_lanes.cuh"
-#include "gpu/packed/prefetch.cuh"
 #include "gpu/packed/decode_params.h"
+#include "gpu/packed/prefetch.cuh"
 #include "packed/packed_format.h"
 
 // The kernel that decodes packed bricks; docs/reference/packed_codec.md has their bytes.
@@ -357,7 +357,7 @@ __device__ void decode_blocks(DecodeShared<kBytes>& shared, const DecodeParams& 
                         static_cast<int>(own / nx % ny) * packed::kEdge,
                         static_cast<int>(own / nx / ny) * packed::kEdge};
   decode_block(blocks[lane >> 3], first, lane, shared.expand, store);
-  if (!good || store.damaged) atomicMin(p.failed, p.number + blockIdx.x / p.parts);
+  if (!good || store.damaged) atomicMin(p.failed, brick.number);
 }
 
 /// `parts` blocks of threads a brick.

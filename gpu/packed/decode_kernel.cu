@@ -1,6 +1,7 @@
 #include "gpu/packed/decode_kernel.h"
 
 #include "gpu/memory/cuda_check.h"
+#include "gpu/packed/check_ranges.cuh"
 #include "gpu/packed/decode_bricks.cuh"
 
 namespace isobrick::inline v0::gpu {
@@ -27,6 +28,15 @@ void launch_decode(ScalarType type, const DecodeParams& params, cudaStream_t str
     default: launch<8, true>(params, stream);
   }
   check_launch("decode_bricks");
+}
+
+void launch_range_check(ScalarType type, const RangeCheckParams& params, cudaStream_t stream) {
+  if (params.count == 0) return;
+  visit_scalar(type, [&](auto tag) {
+    check_ranges<typename decltype(tag)::type>
+        <<<params.count * kChecksOfBrick, kCheckThreads, 0, stream>>>(params);
+  });
+  check_launch("check_ranges");
 }
 
 }  // namespace isobrick::gpu

@@ -13,6 +13,7 @@ struct PackedOnDevice {
   const std::uint8_t* from;  ///< aligned to 4 bytes, and 8 bytes beyond its end can be read
   void* to;                  ///< samples of the whole brick, aligned to 32 bytes
   std::uint32_t palette;     ///< entries; 0: none
+  unsigned long long number;
 };
 
 /// The bricks of a launch.
@@ -23,9 +24,25 @@ struct DecodeParams {
   std::int32_t extent[3];  ///< samples of a brick
   std::int32_t blocks[3];  ///< blocks of 16³ of a brick
   std::uint32_t parts;     ///< blocks of threads a brick
-  std::uint32_t number;    ///< of the first brick, for `failed`
   /// Gets the least number of a brick with a damaged block, unless it holds a lesser one.
-  std::uint32_t* failed;
+  unsigned long long* failed;
+};
+
+/// A decoded brick, and what its samples must lie within.
+struct RangedBrick {
+  const void* samples;
+  unsigned long long number;
+  double lo, hi;
+  std::int32_t inside[3];  ///< samples that are compared, from the first on
+};
+
+/// The bricks of a launch that compares samples with ranges.
+struct RangeCheckParams {
+  static constexpr std::uint32_t kMax = DecodeParams::kMax;
+  RangedBrick bricks[kMax];
+  std::uint32_t count;
+  std::int32_t extent[3];      ///< samples of a brick
+  unsigned long long* failed;  ///< as of DecodeParams
 };
 
 /// All but the bricks, for bricks of `extent` samples.

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <exception>
 #include <mutex>
+#include <optional>
 #include <thread>
 #include <vector>
 
@@ -14,6 +15,7 @@
 #include "gpu/memory/nvtx_range.h"
 #include "gpu/memory/pinned_region.h"
 #include "gpu/memory/upload_tracker.h"
+#include "gpu/stream/packed_uploads.h"
 
 namespace isobrick::inline v0::gpu {
 namespace {
@@ -35,18 +37,19 @@ constexpr int kPoison = 0xff;
 
 struct BrickPool::Impl {
   int device;
-  std::size_t brick_bytes;
+  std::size_t brick_bytes, buffer_bytes;
   PinnedRegion buffers;  ///< of all threads
   DeviceBuffer<std::byte> memory;
   Stream stream;
   std::size_t bricks_of_request;  ///< bricks
   bool by_kernel;                 ///< are bricks copied
   UploadTracker uploads;
+  std::optional<PackedUploads> packed;  ///< where bricks come packed
 
   std::mutex taking;      ///< of `bricks`
   Arena bricks;           ///< `memory`, which they fill without gaps
   std::mutex requesting;  ///< of all below; `completions` may be polled without it
-  std::uint64_t requests = 0, bricks_sent = 0;
+  std::uint64_t requests = 0, bricks_sent = 0, bytes_sent = 0;
   struct Completion : Event {
     Completion() : Event(cudaEventDisableTiming) {}
   };
@@ -57,22 +60,24 @@ struct BrickPool::Impl {
   std::uint64_t timed_bricks = 0;
   std::exception_ptr failure;  ///< of a request: its bricks will never be there
 
-  Impl(int id, std::size_t of_brick, std::size_t count, int threads)
+  Impl(int id, const Lattice& lattice, std::size_t count, int threads, bool is_packed)
       : device(make_current(id)),
-        brick_bytes(of_brick),
-        buffers(id, {static_cast<std::size_t>(pinned_bytes(of_brick, threads))}),
-        memory(count * of_brick),
-        uploads(threads, buffers_of_thread(of_brick)),
+        brick_bytes(lattice.brick_bytes()),
+        buffer_bytes(BrickPool::buffer_bytes(lattice, is_packed)),
+        buffers(id, {static_cast<std::size_t>(pinned_bytes(buffer_bytes, threads))}),
+        memory(count * brick_bytes),
+        uploads(threads, buffers_of_thread(buffer_bytes)),
         bricks(memory.data(), memory.size(), 1) {
+    if (is_packed) packed.emplace(lattice, uploads.buffers(), stream);
     check(cudaMemsetAsync(memory.data(), kPoison, memory.size(), stream.get()));
-    by_kernel = brick_bytes % CopyChunks::kAlign == 0 && reads_host_memory(device);
-    bricks_of_request = std::clamp<std::size_t>(kRequestBytes / of_brick, 1,
+    by_kernel = buffer_bytes % CopyChunks::kAlign == 0 && reads_host_memory(device);
+    bricks_of_request = std::clamp<std::size_t>(kRequestBytes / brick_bytes, 1,
                                                 std::max<std::size_t>(1, uploads.buffers() / 2));
   }
   /// Copies end before their buffers.
   ~Impl() { (void)cudaStreamSynchronize(stream.get()); }
 
-  std::byte* at(std::size_t buffer) { return buffers.touched(0) + buffer * brick_bytes; }
+  std::byte* at(std::size_t buffer) { return buffers.touched(0) + buffer * buffer_bytes; }
 
   /// A buffer of the thread whose brick has been copied. Most copies complete before anybody waits,
   /// so a waiting thread polls: a blocking event costs the driver's thread a core each time,
@@ -133,6 +138,7 @@ struct BrickPool::Impl {
       timed_end.record(stream);
       timing = filled.size();
     }
+    if (packed) packed->decode(filled);
     ++requests;
     completions[requests % kEvents].record(stream);
     bricks_sent += filled.size();
@@ -142,18 +148,20 @@ struct BrickPool::Impl {
   void copy_all(const std::vector<UploadTracker::PendingBrick>& filled, const std::byte* from) {
     CopyChunks some;
     for (const UploadTracker::PendingBrick& brick : filled) {
-      const std::byte* const buffer = from + brick.buffer * brick_bytes;
+      const std::byte* const buffer = from + brick.buffer * buffer_bytes;
+      const std::size_t bytes = packed ? packed->bytes(brick.buffer) : brick_bytes;
+      std::byte* const to = packed ? packed->on_device(brick.buffer) : brick.to;
+      bytes_sent += bytes;
       if (!by_kernel) {
-        check(cudaMemcpyAsync(brick.to, buffer, brick_bytes, cudaMemcpyHostToDevice, stream.get()));
+        check(cudaMemcpyAsync(to, buffer, bytes, cudaMemcpyHostToDevice, stream.get()));
         continue;
       }
-      some.from[some.count] = buffer;
-      some.to[some.count++] = brick.to;
+      some.add(buffer, to, bytes);
       if (some.count < CopyChunks::kMax) continue;
-      launch_copy(some, brick_bytes, stream.get());
+      launch_copy(some, stream.get());
       some.count = 0;
     }
-    launch_copy(some, brick_bytes, stream.get());
+    launch_copy(some, stream.get());
   }
 
   void end_timing() {
@@ -165,8 +173,9 @@ struct BrickPool::Impl {
   }
 };
 
-BrickPool::BrickPool(int device, std::size_t brick_bytes, std::size_t bricks, int threads)
-    : impl_(std::make_unique<Impl>(device, brick_bytes, bricks, threads)) {}
+BrickPool::BrickPool(int device, const Lattice& lattice, std::size_t bricks, int threads,
+                     bool packed)
+    : impl_(std::make_unique<Impl>(device, lattice, bricks, threads, packed)) {}
 
 BrickPool::~BrickPool() = default;
 
@@ -187,6 +196,27 @@ void BrickPool::end(int thread, std::byte* place) {
   if (lock) impl_->request();
 }
 
+std::size_t BrickPool::buffer_bytes(const Lattice& lattice, bool packed) {
+  return packed ? PackedUploads::buffer_bytes(lattice) : lattice.brick_bytes();
+}
+
+void BrickPool::end_packed(int thread, std::byte* place, std::size_t bytes, Int3 brick,
+                           ValueRange<double> range) {
+  const std::size_t buffer = impl_->uploads.latest(thread);
+  impl_->packed->set(buffer, {impl_->at(buffer), bytes}, brick, range);
+  end(thread, place);
+}
+
+std::optional<Int3> BrickPool::find_damaged(bool all) {
+  if (!impl_->packed) return std::nullopt;
+  if (all) {
+    const std::lock_guard lock(impl_->requesting);
+    impl_->request();
+    impl_->stream.wait();
+  }
+  return impl_->packed->damaged();
+}
+
 void BrickPool::wait_on(const Stream& stream) {
   const std::lock_guard lock(impl_->requesting);
   impl_->request();
@@ -203,6 +233,6 @@ double BrickPool::seconds() {
                                         static_cast<double>(impl_->timed_bricks);
 }
 
-std::uint64_t BrickPool::bytes() const { return impl_->bricks_sent * impl_->brick_bytes; }
+std::uint64_t BrickPool::bytes() const { return impl_->bytes_sent; }
 
 }  // namespace isobrick::gpu

@@ -4,7 +4,11 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <vector>
+
+#include <isobrick/lattice.h>
+#include <isobrick/range.h>
 
 namespace isobrick::inline v0::gpu {
 
@@ -12,11 +16,13 @@ class Stream;
 
 /// Device memory for bricks, which several threads fill. Each decodes to pinned buffers of its
 /// own, few enough to stay in its cache: one is copied while the next is filled. The thread that
-/// completes a request's number of bricks makes the device copy all of them.
+/// completes a request's number of bricks makes the device copy all of them. Packed bricks are read
+/// to the buffers, and the device decodes them as well.
 class BrickPool {
  public:
   /// Throws OutOfDeviceMemory where the device has no room. The buffers are got meanwhile.
-  BrickPool(int device, std::size_t brick_bytes, std::size_t bricks, int threads);
+  BrickPool(int device, const Lattice& lattice, std::size_t bricks, int threads,
+            bool packed = false);
   ~BrickPool();
 
   /// The next so many bytes, of all its bricks' once. From any thread.
@@ -28,6 +34,12 @@ class BrickPool {
   /// What begin() was given back for last belongs to `place`. It is copied there before long, in
   /// any case before what wait_on() is for. Throws Error where the host's memory cannot be locked.
   void end(int thread, std::byte* place);
+  /// The same of a packed brick, without its checksum: `bytes` from where begin() was.
+  void end_packed(int thread, std::byte* place, std::size_t bytes, Int3 brick,
+                  ValueRange<double> range);
+  /// A packed brick that the device found wrong; with `all` after all that were ended, by one
+  /// thread at a time.
+  std::optional<Int3> find_damaged(bool all);
   /// What `stream` does from now on finds all bricks that were ended so far. By one thread at a
   /// time.
   void wait_on(const Stream& stream);
@@ -37,14 +49,16 @@ class BrickPool {
   double seconds();
   std::uint64_t bytes() const;
 
+  /// Bytes of a buffer that begin() gives.
+  static std::size_t buffer_bytes(const Lattice& lattice, bool packed);
   /// Buffers of a thread: one to fill, one to copy, and as many again for when that takes longer,
   /// as far as they stay in a core's cache.
-  static constexpr std::size_t buffers_of_thread(std::size_t brick_bytes) {
-    return std::clamp<std::size_t>((std::size_t{2} << 20) / brick_bytes, 2, 8);
+  static constexpr std::size_t buffers_of_thread(std::size_t buffer_bytes) {
+    return std::clamp<std::size_t>((std::size_t{2} << 20) / buffer_bytes, 2, 8);
   }
   /// Page-locked host memory that it takes.
-  static constexpr std::uint64_t pinned_bytes(std::size_t brick_bytes, int threads) {
-    return static_cast<std::uint64_t>(threads) * buffers_of_thread(brick_bytes) * brick_bytes;
+  static constexpr std::uint64_t pinned_bytes(std::size_t buffer_bytes, int threads) {
+    return static_cast<std::uint64_t>(threads) * buffers_of_thread(buffer_bytes) * buffer_bytes;
   }
 
  private:

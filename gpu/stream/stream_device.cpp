@@ -46,8 +46,7 @@ StreamDevice::~StreamDevice() {
 
 bool StreamDevice::allocate(const StreamSizes& sizes) {
   try {
-    memory_ =
-        DeviceBuffer<std::byte>(sizes.device_bytes - sizes.pool.bricks * lattice_.brick_bytes());
+    memory_ = DeviceBuffer<std::byte>(sizes.device_bytes - pool_device_bytes(lattice_, sizes.pool));
   } catch (const OutOfDeviceMemory&) {
     return false;
   }

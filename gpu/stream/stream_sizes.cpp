@@ -64,6 +64,15 @@ std::string too_small(const char* option, std::uint64_t budget, std::uint64_t le
 
 }  // namespace
 
+std::uint64_t pool_device_bytes(const Lattice& lattice, const PoolSizes& pool) {
+  const std::uint64_t bricks = pool.bricks * lattice.brick_bytes();
+  return pool.packed && pool.bricks > 0 ? bricks + pool_pinned_bytes(lattice, pool) : bricks;
+}
+
+std::uint64_t pool_pinned_bytes(const Lattice& lattice, const PoolSizes& pool) {
+  return BrickPool::pinned_bytes(BrickPool::buffer_bytes(lattice, pool.packed), pool.threads);
+}
+
 StreamSizes stream_sizes(const Lattice& lattice, const SurfaceOptions& options, std::uint32_t tiles,
                          int in_flight, PoolSizes pool) {
   StreamSizes s;
@@ -83,10 +92,10 @@ StreamSizes stream_sizes(const Lattice& lattice, const SurfaceOptions& options, 
   s.tile_block_bytes = groups * kBlockGroupSamples * lattice.sample_bytes();
   s.device_bytes =
       kSmallBuffers + std::uint64_t{s.slots} * sizeof(RowTable) + s.tile_block_bytes +
-      pool.bricks * lattice.brick_bytes() +
+      pool_device_bytes(lattice, pool) +
       in_flight_count * (s.staging_bytes + s.sent_bricks * lattice.brick_bytes() + s.output_bytes);
   s.pinned_bytes = kSmallBuffers + in_flight_count * s.staging_bytes + kOutputs * s.output_bytes +
-                   BrickPool::pinned_bytes(lattice.brick_bytes(), pool.threads);
+                   pool_pinned_bytes(lattice, pool);
   s.host_bytes = kBytesOfSlot * s.slots + (in_flight_count + 1) * tiles * kBytesOfCube +
                  in_flight_count * tiles * sizeof(OrderState);
   return s;
@@ -111,15 +120,14 @@ std::size_t bricks_ahead(const Lattice& lattice, const PoolSizes& pool) {
 }
 
 std::uint64_t device_bytes_of(const Lattice& lattice, std::span<const StreamSizes> sizes) {
-  const std::uint64_t pool = sizes.front().pool.bricks * lattice.brick_bytes();
+  const std::uint64_t pool = pool_device_bytes(lattice, sizes.front().pool);
   std::uint64_t bytes = pool;
   for (const StreamSizes& s : sizes) bytes += s.device_bytes - pool;
   return bytes;
 }
 
 std::uint64_t host_bytes_of(const Lattice& lattice, std::span<const StreamSizes> sizes) {
-  const std::uint64_t pool =
-      BrickPool::pinned_bytes(lattice.brick_bytes(), sizes.front().pool.threads);
+  const std::uint64_t pool = pool_pinned_bytes(lattice, sizes.front().pool);
   std::uint64_t bytes = pool;
   for (const StreamSizes& s : sizes) bytes += s.pinned_bytes - pool + s.host_bytes;
   return bytes;
@@ -145,7 +153,7 @@ std::vector<StreamSizes> fit_pool(const Lattice& lattice, std::span<const Surfac
   for (std::uint64_t tiles = std::min<std::uint64_t>(kMaxTilesOfLaunch, all);
        tiles >= std::min<std::uint64_t>(kMinTilesWithPool, all); tiles /= 2)
     for (int in_flight = kMaxInFlight; in_flight >= kMinInFlight; --in_flight) {
-      PoolSizes pool{1, wanted.threads};
+      PoolSizes pool{1, wanted.threads, wanted.packed};
       const auto count = static_cast<std::uint32_t>(tiles);
       const std::uint64_t launches =
           device_bytes_of(lattice, sizes_of_each(lattice, surfaces, count, in_flight, pool));

@@ -14,7 +14,12 @@ namespace isobrick::inline v0::gpu {
 struct PoolSizes {
   std::uint64_t bricks = 0;  ///< 0: there is none, the device reads bricks in host memory
   int threads = 0;
+  bool packed = false;  ///< bricks come packed, and the device decodes them
 };
+
+/// Device memory of a pool, and page-locked host memory.
+std::uint64_t pool_device_bytes(const Lattice& lattice, const PoolSizes& pool);
+std::uint64_t pool_pinned_bytes(const Lattice& lattice, const PoolSizes& pool);
 
 /// How large the buffers of a streaming extraction are.
 struct StreamSizes {

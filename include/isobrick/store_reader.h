@@ -97,6 +97,13 @@ class ISOBRICK_API StoreReader {
   /// checksum; nullopt when it is absent.
   std::optional<std::uint32_t> read_brick_unchecked(int level, Int3 b, std::byte* out) const;
 
+  /// Whether the bricks of a level are packed (BrickCodec::packed).
+  bool is_packed(int level) const;
+  /// Reads and checks brick `b` of such a level as it is stored, without the checksum at its end,
+  /// to the beginning of `out`, which has room for the checksum as well. How many bytes; nullopt
+  /// when it is absent. Throws as read_brick() for all that shows without decoding.
+  std::optional<std::size_t> read_packed(int level, Int3 b, std::span<std::byte> out) const;
+
   /// Hints that brick `b` is read soon, as StoredObject::will_need(). Finds the brick first: reads
   /// its shard's index where that is not cached, and throws as read_brick() does for its place.
   void will_need(int level, Int3 b) const;

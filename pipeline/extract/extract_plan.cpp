@@ -132,6 +132,7 @@ ExtractRequest check_request(const StoreReader& store, const ExtractOptions& opt
                      .transform = request.level->transform,
                      .fill_value = info.fill_value,
                      .may_have_nan = info.may_have_nan && is_floating(info.type)};
+  request.packed = store.is_packed(options.level);
   request.threads = options.threads > 0 ? options.threads : tbb::info::default_concurrency();
   check_cap(request.surface);
   request.search = resolve_index(store, options.level, options.index);

@@ -26,6 +26,7 @@ struct ExtractPlan {
 struct ExtractRequest {
   const LevelInfo* level = nullptr;
   SurfaceOptions surface;
+  bool packed = false;  ///< are the level's bricks
   int threads = 1;
   SearchMethod search;                 ///< for its active blocks
   std::uint64_t search_memory = 0;     ///< that such a search takes

@@ -28,18 +28,27 @@ class HostBricks final : public BrickMemory {
 /// Bricks on the device.
 class DeviceBricks final : public BrickMemory {
  public:
-  DeviceBricks(std::shared_ptr<gpu::BrickPool> pool, std::size_t ahead)
-      : pool_(std::move(pool)), ahead_(ahead) {}
+  /// `packed_bytes`: the most that a packed brick takes; 0: bricks are decoded before.
+  DeviceBricks(std::shared_ptr<gpu::BrickPool> pool, std::size_t ahead, std::size_t packed_bytes)
+      : pool_(std::move(pool)), ahead_(ahead), packed_bytes_(packed_bytes) {}
   std::shared_ptr<std::byte> room(std::size_t bytes) override {
     return {pool_, pool_->take(bytes)};
   }
   std::byte* begin(int thread, std::byte*) override { return pool_->begin(thread); }
   void end(int thread, std::byte* place) override { pool_->end(thread, place); }
+  bool takes_packed() const override { return packed_bytes_ > 0; }
+  std::span<std::byte> begin_packed(int thread) override {
+    return {pool_->begin(thread), packed_bytes_};
+  }
+  void end_packed(int thread, std::byte* place, const PackedLoad& brick) override {
+    pool_->end_packed(thread, place, brick.bytes, brick.brick, brick.range);
+  }
+  std::optional<Int3> find_damaged(bool all) override { return pool_->find_damaged(all); }
   std::size_t bricks_ahead() const override { return ahead_; }
 
  private:
   std::shared_ptr<gpu::BrickPool> pool_;
-  std::size_t ahead_;
+  std::size_t ahead_, packed_bytes_;
 };
 
 class CudaSession final : public GpuSession {
@@ -50,12 +59,13 @@ class CudaSession final : public GpuSession {
                      std::uint64_t other_host_bytes, std::uint64_t most_bricks) override {
     const Lattice& lattice = requests.front().level->lattice;
     const int threads = requests.front().threads;
+    const bool packed = requests.front().packed;
     if (device_budget == 0) device_budget = info_.free_bytes - info_.free_bytes / 10;
     std::vector<SurfaceOptions> surfaces;
     for (const ExtractRequest& request : requests) surfaces.push_back(request.surface);
     const auto fit = [&](std::uint64_t bricks) {
       sizes_ = gpu::fit_stream_sizes(lattice, surfaces, device_budget, host_budget,
-                                     other_host_bytes, {bricks, threads});
+                                     other_host_bytes, {bricks, threads, packed});
     };
     fit(std::min(most_bricks, gpu::preferred_pool_bricks(lattice, threads)));
     bricks_ = std::make_unique<HostBricks>(device_);
@@ -86,12 +96,14 @@ class CudaSession final : public GpuSession {
   bool make_pool(const Lattice& lattice) {
     const gpu::PoolSizes& pool = sizes_.front().pool;
     try {
-      pool_ = std::make_shared<gpu::BrickPool>(device_, lattice.brick_bytes(), pool.bricks,
-                                               pool.threads);
+      pool_ = std::make_shared<gpu::BrickPool>(device_, lattice, pool.bricks, pool.threads,
+                                               pool.packed);
     } catch (const gpu::OutOfDeviceMemory&) {
       return false;
     }
-    bricks_ = std::make_unique<DeviceBricks>(pool_, gpu::bricks_ahead(lattice, pool));
+    bricks_ = std::make_unique<DeviceBricks>(
+        pool_, gpu::bricks_ahead(lattice, pool),
+        pool.packed ? gpu::BrickPool::buffer_bytes(lattice, true) : 0);
     return true;
   }
 

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cstring>
+#include <limits>
+#include <memory>
 #include <thread>
 #include <vector>
 
@@ -12,6 +14,9 @@
 #include "gpu/memory/copy_kernel.h"
 #include "gpu/memory/cuda_objects.h"
 #include "gpu/stream/stream_sizes.h"
+#include "packed/packed_brick.h"
+#include "packed/packed_format.h"
+#include "tests/packed/fields.h"
 
 namespace isobrick::test {
 namespace {
@@ -23,6 +28,12 @@ class GpuBrickPool : public ::testing::Test {
     gpu::open_device(0);
   }
 
+  /// Bricks of so many bytes.
+  static Lattice lattice_of(std::size_t brick_bytes) {
+    const Int3 brick{static_cast<Index>(brick_bytes), 1, 1};
+    return {brick, brick, ScalarType::u8};
+  }
+
   static std::byte sample(std::size_t brick, std::size_t at) {
     return static_cast<std::byte>((brick * 131 + at * 7 + (at >> 8)) & 0xff);
   }
@@ -31,7 +42,7 @@ class GpuBrickPool : public ::testing::Test {
   struct Pool {
     std::size_t brick_bytes, bricks;
     int threads;
-    gpu::BrickPool pool{0, brick_bytes, bricks, threads};
+    gpu::BrickPool pool{0, lattice_of(brick_bytes), bricks, threads};
     std::byte* first = pool.take(brick_bytes * bricks);
 
     /// The brick is sent by the thread whose turn it is.
@@ -98,7 +109,7 @@ TEST_F(GpuBrickPool, BricksOfOddSizesAreCopiedToo) { fill(51 * 51 * 51, 90, 5); 
 TEST_F(GpuBrickPool, WhatCannotBeSentReachesEveryone) {
   // Not of whole words, so a copy of its own, which the driver refuses.
   constexpr std::size_t kBytes = 150'001;
-  gpu::BrickPool pool(0, kBytes, 8, 2);
+  gpu::BrickPool pool(0, lattice_of(kBytes), 8, 2);
   std::memset(pool.begin(0), 1, kBytes);
   pool.end(0, nullptr);
   const gpu::Stream stream;
@@ -114,6 +125,76 @@ TEST_F(GpuBrickPool, WhatCannotBeSentReachesEveryone) {
   EXPECT_THROW(fill_all(), Error);
   (void)cudaGetLastError();  // or this thread's next launch would report it
 }
+
+/// Packed bricks of every type, two threads in turn.
+class GpuPackedBricks : public GpuBrickPool, public ::testing::WithParamInterface<ScalarType> {
+ protected:
+  static constexpr Int3 kBrick{48, 20, 33};
+  static constexpr std::size_t kBricks = 150;
+
+  void SetUp() override {
+    GpuBrickPool::SetUp();
+    if (IsSkipped()) return;
+    pool_ = std::make_unique<gpu::BrickPool>(0, lattice_, kBricks, 2, true);
+    first_ = pool_->take(kBricks * lattice_.brick_bytes());
+  }
+  std::vector<std::byte> brick(std::size_t i) const {
+    return make_brick(lattice_.type, kBrick, kFields[i % kFields.size()], static_cast<unsigned>(i));
+  }
+  void send(std::size_t i, std::span<const std::byte> packed, ValueRange<double> range) {
+    const int thread = static_cast<int>(i % 2);
+    std::copy(packed.begin(), packed.end(), pool_->begin(thread));
+    pool_->end_packed(thread, first_ + i * lattice_.brick_bytes(), packed.size(), place(i), range);
+  }
+  Int3 place(std::size_t i) const {
+    const auto n = static_cast<Index>(i);
+    return {n % 10, n / 10 % 5, n / 50};
+  }
+  std::vector<std::byte> found(std::size_t i) {
+    const gpu::Stream stream;
+    pool_->wait_on(stream);
+    std::vector<std::byte> samples(lattice_.brick_bytes());
+    gpu::check(cudaMemcpyAsync(samples.data(), first_ + i * samples.size(), samples.size(),
+                               cudaMemcpyDeviceToHost, stream.get()));
+    stream.wait();
+    return samples;
+  }
+
+  static constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  static constexpr ValueRange<double> kAll{-kInfinity, kInfinity};
+  const Lattice lattice_{{471, 100, 99}, kBrick, GetParam()};
+  std::unique_ptr<gpu::BrickPool> pool_;
+  std::byte* first_ = nullptr;
+};
+
+TEST_P(GpuPackedBricks, AreDecoded) {
+  for (std::size_t i = 0; i < kBricks; ++i)
+    send(i, pack_brick(lattice_.type, kBrick, brick(i)), kAll);
+  EXPECT_EQ(pool_->find_damaged(true), std::nullopt);
+  for (std::size_t i = 0; i < kBricks; i += 7) EXPECT_EQ(found(i), brick(i)) << i;
+}
+
+TEST_P(GpuPackedBricks, WithSamplesOutsideOfTheirRangeAreNamed) {
+  const auto constant = make_brick(lattice_.type, kBrick, "constant");  // of threes
+  const auto packed = pack_brick(lattice_.type, kBrick, constant);
+  for (std::size_t i = 0; i < kBricks; ++i)
+    send(i, packed, i == 70 || i == 77 ? ValueRange<double>{4, 9} : ValueRange<double>{3, 3});
+  EXPECT_EQ(pool_->find_damaged(true), place(70));
+}
+
+TEST_P(GpuPackedBricks, WithADamagedBlockAreNamed) {
+  for (std::size_t i = 0; i < kBricks; ++i) {
+    auto packed = pack_brick(lattice_.type, kBrick, make_brick(lattice_.type, kBrick, "noise"));
+    // A mask of the first block: it has other planes than there are.
+    const std::size_t head = packed::table_bytes(kBrick) + size_of(lattice_.type) + 5;
+    if (i == 33) packed[head] ^= std::byte{16};
+    send(i, packed, kAll);
+  }
+  EXPECT_EQ(pool_->find_damaged(true), place(33));
+}
+
+INSTANTIATE_TEST_SUITE_P(Types, GpuPackedBricks, ::testing::ValuesIn(kScalarTypes),
+                         [](const auto& test) { return std::string(zarr_name(test.param)); });
 
 TEST(GpuBrickPoolSizes, BricksAreDecodedAsFarAheadAsThePoolHasRoom) {
   const Lattice lattice{{1024, 1024, 1024}, {64, 64, 64}, ScalarType::u16};

@@ -59,7 +59,7 @@ class PooledBricks final : public BrickLookup {
   PooledBricks(const BrickLookup& bricks, const Lattice& lattice)
       : lattice_(lattice),
         places_(static_cast<std::size_t>(volume(lattice.bricks()))),
-        pool_(std::make_shared<gpu::BrickPool>(0, lattice.brick_bytes(), places_.size(), 2)) {
+        pool_(std::make_shared<gpu::BrickPool>(0, lattice, places_.size(), 2)) {
     int thread = 0;
     for_each_point({{0, 0, 0}, lattice.bricks()}, [&](Int3 b) {
       const std::byte* from = bricks.find(b);

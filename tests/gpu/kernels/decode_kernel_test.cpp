@@ -26,17 +26,17 @@ class Decoded {
     auto& words = packed_.emplace_back((packed.size() + 8 + 3) / 4);
     std::memcpy(words.data(), packed.data(), packed.size());
     auto& samples = samples_.emplace_back(static_cast<std::size_t>(volume(extent_)));
-    params_.bricks[params_.count++] = {reinterpret_cast<const std::uint8_t*>(words.data()),
-                                       samples.data(),
-                                       static_cast<std::uint32_t>(layout.entries())};
+    params_.bricks[params_.count] = {reinterpret_cast<const std::uint8_t*>(words.data()),
+                                     samples.data(), static_cast<std::uint32_t>(layout.entries()),
+                                     100 + params_.count};
+    ++params_.count;
   }
   void run(unsigned seed) {
     params_.failed = &failed_;
-    params_.number = 100;
     emulated::run_decode(type_, params_, seed);
   }
   /// The number of the first damaged brick.
-  std::uint32_t failed() const { return failed_; }
+  unsigned long long failed() const { return failed_; }
   std::vector<std::byte> samples(std::size_t i) const {
     std::vector<std::byte> bytes(static_cast<std::size_t>(volume(extent_)) * size_of(type_));
     std::memcpy(bytes.data(), samples_[i].data(), bytes.size());
@@ -49,7 +49,7 @@ class Decoded {
   gpu::DecodeParams params_;
   std::vector<std::vector<std::uint32_t>> packed_;
   std::vector<std::vector<std::uint64_t>> samples_;
-  std::uint32_t failed_ = ~0u;
+  unsigned long long failed_ = ~0ull;
 };
 
 class DecodeKernel : public ::testing::TestWithParam<ScalarType> {};
@@ -65,7 +65,7 @@ TEST_P(DecodeKernel, FindsTheSamplesThatWerePacked) {
       decoded.add(pack_brick(type, extent, bricks.back()));
     }
     decoded.run(++seed);
-    EXPECT_EQ(decoded.failed(), ~0u);
+    EXPECT_EQ(decoded.failed(), ~0ull);
     for (std::size_t i = 0; i < bricks.size(); ++i)
       EXPECT_EQ(decoded.samples(i), bricks[i]) << test::kFields[i] << ' ' << extent.x;
   }
@@ -99,11 +99,41 @@ TEST_P(DecodeKernel, RefusesWhatTheCpuRefuses) {
         continue;
       }
       decoded.run(random());
-      EXPECT_EQ(decoded.failed(), good ? ~0u : 100u) << field << place;
+      EXPECT_EQ(decoded.failed(), good ? ~0ull : 100u) << field << place;
       if (!good) continue;
       EXPECT_EQ(decoded.samples(0), expected) << field << place;
     }
   }
+}
+
+// Samples outside of the range are noticed, but not those of the padding, nor NaN.
+TEST_P(DecodeKernel, ComparesWithRanges) {
+  const ScalarType type = GetParam();
+  visit_scalar(type, [&](auto tag) {
+    using T = typename decltype(tag)::type;
+    const Int3 extent{40, 20, 17};
+    std::vector<T> samples(static_cast<std::size_t>(volume(extent)), T{50});
+    if (is_floating(type)) samples[3] = std::numeric_limits<T>::quiet_NaN();
+    unsigned long long failed = ~0ull;
+    gpu::RangeCheckParams p{};
+    p.count = 1;
+    p.failed = &failed;
+    for (int axis = 0; axis < 3; ++axis) p.extent[axis] = static_cast<std::int32_t>(extent[axis]);
+    p.bricks[0] = {samples.data(), 7, 40, 60, {35, 20, 16}};
+    const auto at = [&](Int3 place) -> T& {
+      return samples[static_cast<std::size_t>(linear_index(place, extent))];
+    };
+    at({35, 3, 3}) = T{99};
+    at({3, 3, 16}) = T{99};
+    emulated::run_range_check(type, p, 1);
+    EXPECT_EQ(failed, ~0ull);
+    for (const T value : {T{39}, T{61}}) {
+      failed = ~0ull;
+      at({34, 19, 15}) = value;
+      emulated::run_range_check(type, p, 2);
+      EXPECT_EQ(failed, 7u);
+    }
+  });
 }
 
 INSTANTIATE_TEST_SUITE_P(Types, DecodeKernel, ::testing::ValuesIn(kScalarTypes),

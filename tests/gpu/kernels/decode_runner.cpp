@@ -2,6 +2,7 @@
 
 #include "tests/gpu/kernels/cuda_language.h"  // before what is written in it
 
+#include "gpu/packed/check_ranges.cuh"
 #include "gpu/packed/decode_bricks.cuh"
 
 namespace isobrick::emulated {
@@ -22,6 +23,13 @@ void run_decode(ScalarType type, const gpu::DecodeParams& params, unsigned seed)
     case 4: return is_floating(type) ? run<4, true>(params, seed) : run<4, false>(params, seed);
     default: return run<8, true>(params, seed);
   }
+}
+
+void run_range_check(ScalarType type, const gpu::RangeCheckParams& params, unsigned seed) {
+  visit_scalar(type, [&](auto tag) {
+    launch(params.count * gpu::kChecksOfBrick, gpu::kCheckThreads, 0, seed,
+           [&] { gpu::check_ranges<typename decltype(tag)::type>(params); });
+  });
 }
 
 }  // namespace isobrick::emulated

@@ -1,0 +1,86 @@
+#include "gpu/stream/packed_uploads.h"
+
+#include <algorithm>
+#include <atomic>
+
+#include "gpu/memory/nvtx_range.h"
+#include "gpu/packed/decode_kernel.h"
+#include "packed/packed_layout.h"
+
+namespace isobrick::inline v0::gpu {
+namespace {
+
+constexpr unsigned long long kNoBrick = ~0ull;
+/// Buffers are aligned to it; the decoder reads up to 8 bytes beyond a brick.
+constexpr std::size_t kAlign = 256, kBeyond = 8, kChecksum = 4;
+
+}  // namespace
+
+PackedUploads::PackedUploads(const Lattice& lattice, std::size_t buffers, const Stream& stream)
+    : lattice_(lattice),
+      buffer_bytes_(buffer_bytes(lattice)),
+      stream_(stream),
+      loads_(buffers),
+      memory_(buffers * buffer_bytes_),
+      failed_(1),
+      failed_here_(1) {
+  failed_here_[0] = kNoBrick;
+  check(cudaMemcpyAsync(failed_.data(), failed_here_.data(), failed_.bytes(),
+                        cudaMemcpyHostToDevice, stream_.get()));
+}
+
+std::size_t PackedUploads::buffer_bytes(const Lattice& lattice) {
+  const std::size_t most = packed::max_packed_bytes(lattice.brick, lattice.sample_bytes());
+  return (most + std::max(kBeyond, kChecksum) + kAlign - 1) / kAlign * kAlign;
+}
+
+void PackedUploads::set(std::size_t buffer, std::span<const std::byte> packed, Int3 brick,
+                        ValueRange<double> range) {
+  const packed::BrickLayout layout(lattice_.type, lattice_.brick, packed);
+  loads_[buffer] = {packed.size(), static_cast<std::uint32_t>(layout.entries()), brick, range};
+}
+
+void PackedUploads::decode(std::span<const UploadTracker::PendingBrick> bricks) {
+  const NvtxRange range("decode packed bricks");
+  for (std::size_t i = 0; i < bricks.size(); i += DecodeParams::kMax)
+    launch(bricks.subspan(i, std::min<std::size_t>(DecodeParams::kMax, bricks.size() - i)));
+  check(cudaMemcpyAsync(failed_here_.data(), failed_.data(), failed_.bytes(),
+                        cudaMemcpyDeviceToHost, stream_.get()));
+}
+
+void PackedUploads::launch(std::span<const UploadTracker::PendingBrick> bricks) {
+  DecodeParams decode = decode_params(lattice_.brick);
+  RangeCheckParams ranges{};
+  decode.failed = ranges.failed = failed_.data();
+  std::copy_n(decode.extent, 3, ranges.extent);
+  for (const UploadTracker::PendingBrick& pending : bricks) {
+    const Load& load = loads_[pending.buffer];
+    const auto number =
+        static_cast<unsigned long long>(linear_index(load.brick, lattice_.bricks()));
+    decode.bricks[decode.count++] = {
+        reinterpret_cast<const std::uint8_t*>(on_device(pending.buffer)), pending.to, load.palette,
+        number};
+    const Int3 inside = lattice_.brick_box(load.brick).extent();
+    ranges.bricks[ranges.count++] = {
+        pending.to,
+        number,
+        load.range.lo,
+        load.range.hi,
+        {static_cast<std::int32_t>(inside.x), static_cast<std::int32_t>(inside.y),
+         static_cast<std::int32_t>(inside.z)}};
+  }
+  launch_decode(lattice_.type, decode, stream_.get());
+  launch_range_check(lattice_.type, ranges, stream_.get());
+}
+
+std::optional<Int3> PackedUploads::damaged() const {
+  const unsigned long long number =
+      std::atomic_ref(const_cast<unsigned long long&>(failed_here_[0]))
+          .load(std::memory_order_relaxed);
+  if (number == kNoBrick) return std::nullopt;
+  const Int3 grid = lattice_.bricks();
+  const auto i = static_cast<Index>(number);
+  return Int3{i % grid.x, i / grid.x % grid.y, i / grid.x / grid.y};
+}
+
+}  // namespace isobrick::gpu

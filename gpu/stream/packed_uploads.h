@@ -1,0 +1,60 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include <isobrick/lattice.h>
+#include <isobrick/range.h>
+#include "gpu/memory/cuda_objects.h"
+#include "gpu/memory/device_buffer.h"
+#include "gpu/memory/pinned_buffer.h"
+#include "gpu/memory/upload_tracker.h"
+
+namespace isobrick::inline v0::gpu {
+
+/// Packed bricks in pinned buffers on their way to a device, which decodes them. Beside each buffer
+/// lies one on the device, for what is packed.
+class PackedUploads {
+ public:
+  /// Buffers of buffer_bytes(). Throws OutOfDeviceMemory.
+  PackedUploads(const Lattice& lattice, std::size_t buffers, const Stream& stream);
+
+  /// The most bytes that a packed brick takes, its checksum and what the decoder may read beyond.
+  static std::size_t buffer_bytes(const Lattice& lattice);
+
+  /// What the thread that fills a buffer has put there. Throws DamageError for bytes that no brick
+  /// is packed to.
+  void set(std::size_t buffer, std::span<const std::byte> packed, Int3 brick,
+           ValueRange<double> range);
+  std::size_t bytes(std::size_t buffer) const { return loads_[buffer].bytes; }
+  /// Where a buffer is copied to.
+  std::byte* on_device(std::size_t buffer) { return memory_.data() + buffer * buffer_bytes_; }
+  /// Decodes bricks that have been copied, and compares them with their ranges.
+  void decode(std::span<const UploadTracker::PendingBrick> bricks);
+
+  /// A brick that was found wrong, of those decoded so far.
+  std::optional<Int3> damaged() const;
+
+ private:
+  struct Load {
+    std::size_t bytes = 0;
+    std::uint32_t palette = 0;
+    Int3 brick;
+    ValueRange<double> range;
+  };
+
+  void launch(std::span<const UploadTracker::PendingBrick> bricks);
+
+  Lattice lattice_;
+  std::size_t buffer_bytes_;
+  Stream stream_;
+  std::vector<Load> loads_;  ///< of each buffer
+  DeviceBuffer<std::byte> memory_;
+  DeviceBuffer<unsigned long long> failed_;
+  PinnedBuffer<unsigned long long> failed_here_;
+};
+
+}  // namespace isobrick::gpu
