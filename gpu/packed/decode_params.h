@@ -1,7 +1,9 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 
+#include <isobrick/lattice.h>
 #include "packed/packed_format.h"
 
 // What the host hands to the kernel that decodes packed bricks. Plain data, no CUDA header.
@@ -15,6 +17,17 @@ struct PackedOnDevice {
   std::uint32_t palette;     ///< entries; 0: none
   unsigned long long number;
 };
+
+/// The decoder may read so many bytes beyond a brick.
+inline constexpr std::size_t kReadBeyond = 8;
+
+/// Room for any packed brick of such a lattice, its checksum and what is read beyond it.
+inline std::size_t packed_room(const Lattice& lattice) {
+  constexpr std::size_t kAlign = 256;
+  return (packed::max_packed_bytes(lattice.brick, lattice.sample_bytes()) + kReadBeyond + kAlign -
+          1) /
+         kAlign * kAlign;
+}
 
 /// The bricks of a launch.
 struct DecodeParams {

@@ -23,6 +23,8 @@ namespace {
 /// Copies that one request makes: the driver admits one thread at a time, and the bus is idle
 /// between two requests.
 constexpr std::size_t kRequestBytes = std::size_t{4} << 20;
+/// The same for packed bricks, decoded: a device decodes few as long as many.
+constexpr std::size_t kPackedRequestBytes = std::size_t{8} << 20;
 /// One request of so many is timed: events that record times slow all copies down.
 constexpr std::uint64_t kTimedOf = 16;
 /// Requests with an event of their own; all older ones are known to have completed.
@@ -64,19 +66,22 @@ struct BrickPool::Impl {
       : device(make_current(id)),
         brick_bytes(lattice.brick_bytes()),
         buffer_bytes(BrickPool::buffer_bytes(lattice, is_packed)),
-        buffers(id, {static_cast<std::size_t>(pinned_bytes(buffer_bytes, threads))}),
+        buffers(id, {static_cast<std::size_t>(pinned_bytes(buffer_bytes, threads, is_packed))}),
         memory(count * brick_bytes),
-        uploads(threads, buffers_of_thread(buffer_bytes)),
+        uploads(threads, buffers_of_thread(buffer_bytes, is_packed)),
         bricks(memory.data(), memory.size(), 1) {
-    if (is_packed) packed.emplace(lattice, uploads.buffers(), stream);
+    if (is_packed) packed.emplace(lattice, uploads.buffers());
     check(cudaMemsetAsync(memory.data(), kPoison, memory.size(), stream.get()));
     by_kernel = buffer_bytes % CopyChunks::kAlign == 0 && reads_host_memory(device);
-    bricks_of_request = std::clamp<std::size_t>(kRequestBytes / brick_bytes, 1,
-                                                std::max<std::size_t>(1, uploads.buffers() / 2));
+    bricks_of_request =
+        std::clamp<std::size_t>((is_packed ? kPackedRequestBytes : kRequestBytes) / brick_bytes, 1,
+                                std::max<std::size_t>(1, uploads.buffers() / 2));
   }
   /// Copies end before their buffers.
   ~Impl() { (void)cudaStreamSynchronize(stream.get()); }
 
+  /// What comes after all bricks that were requested.
+  const Stream& sent() const { return packed ? packed->decoded() : stream; }
   std::byte* at(std::size_t buffer) { return buffers.touched(0) + buffer * buffer_bytes; }
 
   /// A buffer of the thread whose brick has been copied. Most copies complete before anybody waits,
@@ -138,9 +143,9 @@ struct BrickPool::Impl {
       timed_end.record(stream);
       timing = filled.size();
     }
-    if (packed) packed->decode(filled);
+    if (packed) packed->decode(filled, stream);
     ++requests;
-    completions[requests % kEvents].record(stream);
+    completions[requests % kEvents].record(sent());
     bricks_sent += filled.size();
     uploads.requested(filled, requests);
   }
@@ -196,10 +201,6 @@ void BrickPool::end(int thread, std::byte* place) {
   if (lock) impl_->request();
 }
 
-std::size_t BrickPool::buffer_bytes(const Lattice& lattice, bool packed) {
-  return packed ? PackedUploads::buffer_bytes(lattice) : lattice.brick_bytes();
-}
-
 void BrickPool::end_packed(int thread, std::byte* place, std::size_t bytes, Int3 brick,
                            ValueRange<double> range) {
   const std::size_t buffer = impl_->uploads.latest(thread);
@@ -212,7 +213,7 @@ std::optional<Int3> BrickPool::find_damaged(bool all) {
   if (all) {
     const std::lock_guard lock(impl_->requesting);
     impl_->request();
-    impl_->stream.wait();
+    impl_->sent().wait();
   }
   return impl_->packed->damaged();
 }
@@ -220,7 +221,7 @@ std::optional<Int3> BrickPool::find_damaged(bool all) {
 void BrickPool::wait_on(const Stream& stream) {
   const std::lock_guard lock(impl_->requesting);
   impl_->request();
-  impl_->all_sent.record(impl_->stream);
+  impl_->all_sent.record(impl_->sent());
   check(cudaStreamWaitEvent(stream.get(), impl_->all_sent.get()));
 }
 

@@ -9,6 +9,7 @@
 
 #include <isobrick/lattice.h>
 #include <isobrick/range.h>
+#include "gpu/packed/decode_params.h"
 
 namespace isobrick::inline v0::gpu {
 
@@ -50,15 +51,21 @@ class BrickPool {
   std::uint64_t bytes() const;
 
   /// Bytes of a buffer that begin() gives.
-  static std::size_t buffer_bytes(const Lattice& lattice, bool packed);
+  static std::size_t buffer_bytes(const Lattice& lattice, bool packed) {
+    return packed ? packed_room(lattice) : lattice.brick_bytes();
+  }
   /// Buffers of a thread: one to fill, one to copy, and as many again for when that takes longer,
   /// as far as they stay in a core's cache.
-  static constexpr std::size_t buffers_of_thread(std::size_t buffer_bytes) {
-    return std::clamp<std::size_t>((std::size_t{2} << 20) / buffer_bytes, 2, 8);
+  /// Packed bricks leave most of a buffer untouched, and are on their way for longer.
+  static constexpr std::size_t buffers_of_thread(std::size_t buffer_bytes, bool packed = false) {
+    const std::size_t few = std::clamp<std::size_t>((std::size_t{2} << 20) / buffer_bytes, 2, 8);
+    return packed ? 2 * few : few;
   }
   /// Page-locked host memory that it takes.
-  static constexpr std::uint64_t pinned_bytes(std::size_t buffer_bytes, int threads) {
-    return static_cast<std::uint64_t>(threads) * buffers_of_thread(buffer_bytes) * buffer_bytes;
+  static constexpr std::uint64_t pinned_bytes(std::size_t buffer_bytes, int threads,
+                                              bool packed = false) {
+    return static_cast<std::uint64_t>(threads) * buffers_of_thread(buffer_bytes, packed) *
+           buffer_bytes;
   }
 
  private:

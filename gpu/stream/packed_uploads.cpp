@@ -11,28 +11,21 @@ namespace isobrick::inline v0::gpu {
 namespace {
 
 constexpr unsigned long long kNoBrick = ~0ull;
-/// Buffers are aligned to it; the decoder reads up to 8 bytes beyond a brick.
-constexpr std::size_t kAlign = 256, kBeyond = 8, kChecksum = 4;
 
 }  // namespace
 
-PackedUploads::PackedUploads(const Lattice& lattice, std::size_t buffers, const Stream& stream)
+PackedUploads::PackedUploads(const Lattice& lattice, std::size_t buffers)
     : lattice_(lattice),
-      buffer_bytes_(buffer_bytes(lattice)),
-      stream_(stream),
+      buffer_bytes_(packed_room(lattice)),
       loads_(buffers),
       memory_(buffers * buffer_bytes_),
       failed_(1),
       failed_here_(1) {
   failed_here_[0] = kNoBrick;
-  check(cudaMemcpyAsync(failed_.data(), failed_here_.data(), failed_.bytes(),
-                        cudaMemcpyHostToDevice, stream_.get()));
+  check(cudaMemcpy(failed_.data(), failed_here_.data(), failed_.bytes(), cudaMemcpyHostToDevice));
 }
 
-std::size_t PackedUploads::buffer_bytes(const Lattice& lattice) {
-  const std::size_t most = packed::max_packed_bytes(lattice.brick, lattice.sample_bytes());
-  return (most + std::max(kBeyond, kChecksum) + kAlign - 1) / kAlign * kAlign;
-}
+PackedUploads::~PackedUploads() { (void)cudaStreamSynchronize(order_.get()); }
 
 void PackedUploads::set(std::size_t buffer, std::span<const std::byte> packed, Int3 brick,
                         ValueRange<double> range) {
@@ -40,15 +33,23 @@ void PackedUploads::set(std::size_t buffer, std::span<const std::byte> packed, I
   loads_[buffer] = {packed.size(), static_cast<std::uint32_t>(layout.entries()), brick, range};
 }
 
-void PackedUploads::decode(std::span<const UploadTracker::PendingBrick> bricks) {
+void PackedUploads::decode(std::span<const UploadTracker::PendingBrick> bricks,
+                           const Stream& copies) {
   const NvtxRange range("decode packed bricks");
+  Lane& lane = lanes_[calls_++ % kLanes];
+  lane.copied.record(copies);
+  check(cudaStreamWaitEvent(lane.stream.get(), lane.copied.get()));
   for (std::size_t i = 0; i < bricks.size(); i += DecodeParams::kMax)
-    launch(bricks.subspan(i, std::min<std::size_t>(DecodeParams::kMax, bricks.size() - i)));
+    launch(bricks.subspan(i, std::min<std::size_t>(DecodeParams::kMax, bricks.size() - i)),
+           lane.stream);
+  lane.decoded.record(lane.stream);
+  check(cudaStreamWaitEvent(order_.get(), lane.decoded.get()));
   check(cudaMemcpyAsync(failed_here_.data(), failed_.data(), failed_.bytes(),
-                        cudaMemcpyDeviceToHost, stream_.get()));
+                        cudaMemcpyDeviceToHost, order_.get()));
 }
 
-void PackedUploads::launch(std::span<const UploadTracker::PendingBrick> bricks) {
+void PackedUploads::launch(std::span<const UploadTracker::PendingBrick> bricks,
+                           const Stream& stream) {
   DecodeParams decode = decode_params(lattice_.brick);
   RangeCheckParams ranges{};
   decode.failed = ranges.failed = failed_.data();
@@ -69,8 +70,8 @@ void PackedUploads::launch(std::span<const UploadTracker::PendingBrick> bricks) 
         {static_cast<std::int32_t>(inside.x), static_cast<std::int32_t>(inside.y),
          static_cast<std::int32_t>(inside.z)}};
   }
-  launch_decode(lattice_.type, decode, stream_.get());
-  launch_range_check(lattice_.type, ranges, stream_.get());
+  launch_decode(lattice_.type, decode, stream.get());
+  launch_range_check(lattice_.type, ranges, stream.get());
 }
 
 std::optional<Int3> PackedUploads::damaged() const {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -19,11 +20,9 @@ namespace isobrick::inline v0::gpu {
 /// lies one on the device, for what is packed.
 class PackedUploads {
  public:
-  /// Buffers of buffer_bytes(). Throws OutOfDeviceMemory.
-  PackedUploads(const Lattice& lattice, std::size_t buffers, const Stream& stream);
-
-  /// The most bytes that a packed brick takes, its checksum and what the decoder may read beyond.
-  static std::size_t buffer_bytes(const Lattice& lattice);
+  /// Buffers of packed_room(). Throws OutOfDeviceMemory.
+  PackedUploads(const Lattice& lattice, std::size_t buffers);
+  ~PackedUploads();
 
   /// What the thread that fills a buffer has put there. Throws DamageError for bytes that no brick
   /// is packed to.
@@ -32,8 +31,11 @@ class PackedUploads {
   std::size_t bytes(std::size_t buffer) const { return loads_[buffer].bytes; }
   /// Where a buffer is copied to.
   std::byte* on_device(std::size_t buffer) { return memory_.data() + buffer * buffer_bytes_; }
-  /// Decodes bricks that have been copied, and compares them with their ranges.
-  void decode(std::span<const UploadTracker::PendingBrick> bricks);
+  /// Decodes bricks once `copies` has copied them, and compares them with their ranges. Few bricks
+  /// keep a device busy for as long as many, so that several calls are worked on at a time.
+  void decode(std::span<const UploadTracker::PendingBrick> bricks, const Stream& copies);
+  /// What comes after all bricks that were decoded so far, in the order of the calls.
+  const Stream& decoded() const { return order_; }
 
   /// A brick that was found wrong, of those decoded so far.
   std::optional<Int3> damaged() const;
@@ -46,11 +48,20 @@ class PackedUploads {
     ValueRange<double> range;
   };
 
-  void launch(std::span<const UploadTracker::PendingBrick> bricks);
+  static constexpr std::size_t kLanes = 4;
+  /// Calls that are worked on one after the other.
+  struct Lane {
+    Stream stream;
+    Event copied{cudaEventDisableTiming}, decoded{cudaEventDisableTiming};
+  };
+
+  void launch(std::span<const UploadTracker::PendingBrick> bricks, const Stream& stream);
 
   Lattice lattice_;
   std::size_t buffer_bytes_;
-  Stream stream_;
+  std::array<Lane, kLanes> lanes_;
+  std::uint64_t calls_ = 0;
+  Stream order_;
   std::vector<Load> loads_;  ///< of each buffer
   DeviceBuffer<std::byte> memory_;
   DeviceBuffer<unsigned long long> failed_;

@@ -70,7 +70,8 @@ std::uint64_t pool_device_bytes(const Lattice& lattice, const PoolSizes& pool) {
 }
 
 std::uint64_t pool_pinned_bytes(const Lattice& lattice, const PoolSizes& pool) {
-  return BrickPool::pinned_bytes(BrickPool::buffer_bytes(lattice, pool.packed), pool.threads);
+  return BrickPool::pinned_bytes(BrickPool::buffer_bytes(lattice, pool.packed), pool.threads,
+                                 pool.packed);
 }
 
 StreamSizes stream_sizes(const Lattice& lattice, const SurfaceOptions& options, std::uint32_t tiles,

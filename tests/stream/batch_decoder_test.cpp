@@ -6,6 +6,7 @@
 #include <fstream>
 
 #include <isobrick/error.h>
+#include "packed/packed_brick.h"
 #include "tests/stream/heap_memory.h"
 #include "tests/stream/stored_volume.h"
 
@@ -29,6 +30,32 @@ class ElsewhereMemory final : public HeapMemory {
   std::vector<std::vector<std::byte>> buffers_;
 };
 
+/// As a device that decodes packed bricks has it: each is decoded in its place after a while.
+class DecodingMemory final : public HeapMemory {
+ public:
+  DecodingMemory(const Lattice& lattice, int threads)
+      : lattice_(lattice),
+        buffers_(static_cast<std::size_t>(threads),
+                 std::vector<std::byte>(2 * lattice.brick_bytes())) {}
+  bool takes_packed() const override { return true; }
+  std::span<std::byte> begin_packed(int thread) override { return buffer(thread); }
+  void end_packed(int thread, std::byte* place, const PackedLoad& load) override {
+    EXPECT_LE(load.range.lo, load.range.hi);
+    unpack_brick(lattice_.type, lattice_.brick, std::span(buffer(thread)).first(load.bytes),
+                 {place, lattice_.brick_bytes()});
+  }
+  std::optional<Int3> find_damaged(bool all) override { return all ? at_the_end : meanwhile; }
+
+  std::optional<Int3> meanwhile, at_the_end;
+
+ private:
+  std::vector<std::byte>& buffer(int thread) {
+    return buffers_.at(static_cast<std::size_t>(thread));
+  }
+  Lattice lattice_;
+  std::vector<std::vector<std::byte>> buffers_;
+};
+
 class NoMemory final : public BrickMemory {
   std::shared_ptr<std::byte> room(std::size_t) override { throw Error("no memory"); }
 };
@@ -41,6 +68,7 @@ class Decoder : public StoredVolume {
     int threads = 3;
     std::size_t held = 1;    ///< batches that are in use at a time
     bool elsewhere = false;  ///< bricks are decoded elsewhere than where they lie
+    bool packed = false;     ///< where they lie they are decoded
   };
   struct Seen {
     std::vector<Int3> tiles;
@@ -55,9 +83,10 @@ class Decoder : public StoredVolume {
     TileStream stream(store, 0, 20000, lattice.box());
     BatchPlanner planner(stream, lattice, way.reach, false, way.tiles, way.capacity / way.held);
     Seen seen;
-    const std::unique_ptr<HeapMemory> memory =
-        way.elsewhere ? std::make_unique<ElsewhereMemory>(lattice.brick_bytes(), way.threads)
-                      : std::make_unique<HeapMemory>();
+    std::unique_ptr<HeapMemory> memory = std::make_unique<HeapMemory>();
+    if (way.elsewhere)
+      memory = std::make_unique<ElsewhereMemory>(lattice.brick_bytes(), way.threads);
+    if (way.packed) memory = std::make_unique<DecodingMemory>(lattice, way.threads);
     BatchDecoder decoder(store, 0, planner, way.reach, way.capacity, way.threads, *memory);
     std::deque<std::shared_ptr<const DecodedBatch>> held;
     while (auto batch = decoder.next()) {
@@ -103,6 +132,39 @@ TEST_F(Decoder, EveryTileComesOnceWithItsBricksHoweverShortRoomIs) {
       }
     }
   }
+}
+
+TEST_F(Decoder, PackedBricksMayBeDecodedWhereTheyLie) {
+  make_store(BrickCodec::packed);
+  const std::vector<Int3> expected = active_tiles(StoreReader(path_), 20000);
+  EXPECT_EQ(decode({.reach = 1}).tiles, expected);  // on the processor
+  EXPECT_EQ(decode({.reach = 1, .packed = true}).tiles, expected);
+}
+
+// The processor looks at the brick that a device finds wrong, and says what is wrong with it.
+TEST_F(Decoder, WhatADeviceFindsWrongEndsIt) {
+  make_store(BrickCodec::packed);
+  const StoreReader store(path_);
+  const Lattice& lattice = store.info().levels[0].lattice;
+  const auto fails = [&](std::optional<Int3> meanwhile, std::optional<Int3> at_the_end) {
+    TileStream stream(store, 0, 20000, lattice.box());
+    BatchPlanner planner(stream, lattice, 0, false, 2, 50);
+    DecodingMemory memory(lattice, 2);
+    memory.meanwhile = meanwhile;
+    memory.at_the_end = at_the_end;
+    BatchDecoder decoder(store, 0, planner, 0, 50, 2, memory);
+    std::size_t batches = 0;
+    try {
+      while (decoder.next()) ++batches;
+    } catch (const Error& e) {
+      EXPECT_NE(std::string(e.what()).find("brick (2, 1, 0)"), std::string::npos) << e.what();
+      return batches;
+    }
+    ADD_FAILURE() << "goes on";
+    return batches;
+  };
+  EXPECT_EQ(fails(Int3{2, 1, 0}, {}), 0u);
+  EXPECT_GT(fails({}, Int3{2, 1, 0}), 1u);
 }
 
 TEST_F(Decoder, WhoeverTakesBatchesMayStopEarly) {

@@ -23,9 +23,12 @@ class StoredVolume : public ::testing::Test {
     samples_ = make_samples<std::uint16_t>(extent_, 5);
     // One brick that equals the fill value, hence absent.
     for_each_point({{32, 0, 0}, {64, 32, 32}}, [&](Int3 p) { samples_[index(p)] = 0; });
+    make_store(BrickCodec::zstd);
+  }
+  void make_store(BrickCodec codec) {
     MemorySource source(extent_, ScalarType::u16, as_bytes(samples_));
     NoProgress silent;
-    convert(source, path_, {.brick = 32, .shard = 64}, silent);
+    convert(source, path_, {.brick = 32, .shard = 64, .codec = codec, .force = true}, silent);
   }
   void TearDown() override { std::filesystem::remove_all(path_); }
 
