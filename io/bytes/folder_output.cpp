@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <utility>
+#include <vector>
 
 #include <isobrick/error.h>
 #include "io/bytes/folder_walk.h"
@@ -14,6 +15,24 @@ namespace isobrick::inline v0 {
 namespace {
 
 namespace fs = std::filesystem;
+
+/// The first entry of a folder that is no part of an output, from `root` on; empty: none. Folders
+/// are parts that hold parts and nothing else.
+fs::path find_foreign(const fs::path& root, const fs::path& folder,
+                      const FolderOutput::IsOwnName& is_own_name) {
+  const std::vector<FolderEntry> entries = folder_entries(root / folder);
+  if (entries.empty() && !folder.empty()) return folder;
+  for (const FolderEntry& entry : entries) {
+    const fs::path name = folder / entry.name;
+    if (entry.type == fs::file_type::directory) {
+      if (fs::path foreign = find_foreign(root, name, is_own_name); !foreign.empty())
+        return foreign;
+    } else if (entry.type != fs::file_type::regular || !is_own_name(name.native())) {
+      return name;
+    }
+  }
+  return {};
+}
 
 }  // namespace
 
@@ -35,10 +54,9 @@ void FolderOutput::check_place() const {
     throw UsageError(fmt::format("'{}' exists already; add --force to replace it", path_.string()));
   if (fs::symlink_status(path_).type() != fs::file_type::directory)
     throw UsageError(fmt::format("'{}' is no folder; name another output", path_.string()));
-  for (const FolderEntry& entry : folder_entries(path_))
-    if (entry.type != fs::file_type::regular || !is_own_name_(entry.name))
-      throw UsageError(fmt::format("'{}' holds '{}', which is no part of the output; move it away",
-                                   path_.string(), entry.name));
+  if (const fs::path foreign = find_foreign(path_, {}, is_own_name_); !foreign.empty())
+    throw UsageError(fmt::format("'{}' holds '{}', which is no part of the output; move it away",
+                                 path_.string(), foreign.string()));
   check_replaces_no_input(path_, {});
 }
 

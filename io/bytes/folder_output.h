@@ -13,7 +13,8 @@ namespace isobrick::inline v0 {
 /// a killed process left of the same output is removed first.
 class FolderOutput {
  public:
-  /// Whether a file of this name belongs to such an output.
+  /// Whether a file of this name, which begins with those of folders within the output, belongs to
+  /// such an output.
   using IsOwnName = std::function<bool(std::string_view)>;
 
   /// Throws UsageError when `path` exists and `force` is not set, or when it is no folder of files
