@@ -74,6 +74,11 @@ if(ISOBRICK_IMATH_LIBRARY)
   list(APPEND isobrick_openvdb_libraries ${ISOBRICK_IMATH_LIBRARY})
 endif()
 
+# Meshes with levels of detail.
+pkg_check_modules(draco QUIET IMPORTED_TARGET draco)
+isobrick_found_option(ISOBRICK_DRACO "Write neuroglancer's meshes" "${draco_FOUND}" Draco
+  "neuroglancer's meshes cannot be written")
+
 # Stores behind URLs. 7.85 has the options by name of protocols.
 find_package(CURL 7.85 QUIET)
 isobrick_found_option(ISOBRICK_CURL "Read stores from URLs" "${CURL_FOUND}" libcurl

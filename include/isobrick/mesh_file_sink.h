@@ -11,8 +11,8 @@
 
 namespace isobrick::inline v0 {
 
-/// The files that a mesh can become.
-enum class MeshFormat : std::uint8_t { ply, stl, obj, glb, vtp, pvtp };
+/// The files that a mesh can become; of neuroglancer a folder of levels of detail.
+enum class MeshFormat : std::uint8_t { ply, stl, obj, glb, vtp, pvtp, neuroglancer };
 
 /// The format's name for people: "PLY".
 ISOBRICK_API std::string_view name_of(MeshFormat format);
@@ -29,12 +29,21 @@ ISOBRICK_API bool has_normals(MeshFormat format);
 ISOBRICK_API bool has_vertices(MeshFormat format);
 /// Whether it holds MeshChunk::attributes: PLY, GLB, VTP and PVTP do. Others ignore them.
 ISOBRICK_API bool has_attributes(MeshFormat format);
+/// Whether it is a folder with the mesh at several levels of detail: neuroglancer is.
+ISOBRICK_API bool has_levels(MeshFormat format);
+
+/// Levels of detail at most.
+inline constexpr int kMaxMeshLevels = 16;
 
 /// How a mesh file is written.
 struct MeshFileOptions {
   std::optional<MeshFormat> format = {};  ///< nullopt: by the name's extension
   bool quantize = false;                  ///< GLB: 16 bits a number (KHR_mesh_quantization)
-  bool force = false;                     ///< replaces a file that exists
+  /// Of formats with levels of detail: how many at most, 1 to kMaxMeshLevels. Each has a quarter of
+  /// the triangles of the one before. 0: until one part has the whole mesh.
+  int levels = 0;
+  bool sharded = false;  ///< neuroglancer: few large files
+  bool force = false;    ///< replaces a file that exists
   int threads = 0;                        ///< that may help to write; 0: all cores
   /// Bytes of the whole operation's budget, of which the sink takes a small part
   /// (MeshSink::memory).
@@ -43,8 +52,9 @@ struct MeshFileOptions {
 
 /// Opens a mesh file for extract(). It has its name once it is finished; a sink that is destroyed
 /// before leaves nothing. The name "-" is standard output, which is written to once the mesh is
-/// finished, of OBJ sooner; PVTP cannot go there. Throws UsageError when the file exists and
-/// `force` is not set or its name has no known extension, Error when it cannot be made.
+/// finished, of OBJ sooner; PVTP and folders cannot go there. Throws UsageError when the file exists
+/// and `force` is not set, its name has no known extension, options do not fit the format or the
+/// format needs a library that is not there; Error when it cannot be made.
 ISOBRICK_API std::unique_ptr<MeshSink> create_mesh_file(const std::filesystem::path& path,
                                                         const MeshFileOptions& options);
 

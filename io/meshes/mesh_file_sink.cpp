@@ -8,6 +8,7 @@
 
 #include <isobrick/error.h>
 #include "io/meshes/glb_sink.h"
+#include "io/meshes/levels/neuroglancer_folder.h"
 #include "io/meshes/mesh_parts.h"
 #include "io/meshes/obj_sink.h"
 #include "io/meshes/ply_sink.h"
@@ -22,18 +23,30 @@ struct NamedFormat {
   std::string_view extension, name;
 };
 
-constexpr std::array<NamedFormat, 6> kFormats{{{MeshFormat::ply, ".ply", "PLY"},
-                                               {MeshFormat::stl, ".stl", "STL"},
-                                               {MeshFormat::obj, ".obj", "OBJ"},
-                                               {MeshFormat::glb, ".glb", "GLB"},
-                                               {MeshFormat::vtp, ".vtp", "VTP"},
-                                               {MeshFormat::pvtp, ".pvtp", "PVTP"}}};
+constexpr std::array<NamedFormat, 7> kFormats{
+    {{MeshFormat::ply, ".ply", "PLY"},
+     {MeshFormat::stl, ".stl", "STL"},
+     {MeshFormat::obj, ".obj", "OBJ"},
+     {MeshFormat::glb, ".glb", "GLB"},
+     {MeshFormat::vtp, ".vtp", "VTP"},
+     {MeshFormat::pvtp, ".pvtp", "PVTP"},
+     {MeshFormat::neuroglancer, ".neuroglancer", "neuroglancer's format"}}};
 
 /// What a PLY file's faces may take of a budget until they are written: nothing of a small one,
 /// which the extraction needs.
 std::size_t faces_memory(std::uint64_t memory) {
   constexpr std::uint64_t mib = std::uint64_t{1} << 20;
   return memory < 512 * mib ? 0 : static_cast<std::size_t>(std::min(memory / 16, 64 * mib));
+}
+
+/// Throws UsageError for levels that the format has not.
+void check_levels(MeshFormat format, const MeshFileOptions& options) {
+  if (!has_levels(format) && (options.levels != 0 || options.sharded))
+    throw UsageError(fmt::format("{} has no levels of detail and no shards; neuroglancer's has",
+                                 name_of(format)));
+  if (options.levels < 0 || options.levels > kMaxMeshLevels)
+    throw UsageError(
+        fmt::format("a mesh has 1 to {} levels of detail, not {}", kMaxMeshLevels, options.levels));
 }
 
 }  // namespace
@@ -55,13 +68,18 @@ std::optional<MeshFormat> find_mesh_format(std::string_view extension) {
   return std::nullopt;
 }
 
-bool has_normals(MeshFormat format) { return format != MeshFormat::stl; }
+bool has_normals(MeshFormat format) {
+  return format != MeshFormat::stl && format != MeshFormat::neuroglancer;
+}
 
 bool has_vertices(MeshFormat format) { return format != MeshFormat::stl; }
 
 bool has_attributes(MeshFormat format) {
-  return format != MeshFormat::stl && format != MeshFormat::obj;
+  return format != MeshFormat::stl && format != MeshFormat::obj &&
+         format != MeshFormat::neuroglancer;
 }
+
+bool has_levels(MeshFormat format) { return format == MeshFormat::neuroglancer; }
 
 std::unique_ptr<MeshSink> create_mesh_file(const std::filesystem::path& path,
                                            const MeshFileOptions& options) {
@@ -70,8 +88,10 @@ std::unique_ptr<MeshSink> create_mesh_file(const std::filesystem::path& path,
   const auto format = options.format ? options.format : find_mesh_format(path.extension().string());
   if (!format)
     throw UsageError(fmt::format(
-        "'{}' is no mesh that can be written; name it .ply, .stl, .obj, .glb, .vtp or .pvtp",
+        "'{}' is no mesh that can be written; name it .ply, .stl, .obj, .glb, .vtp, .pvtp or "
+        ".neuroglancer",
         name));
+  check_levels(*format, options);
   switch (*format) {
     case MeshFormat::ply:
       return std::make_unique<PlySink>(name, force, faces_memory(options.memory));
@@ -81,6 +101,11 @@ std::unique_ptr<MeshSink> create_mesh_file(const std::filesystem::path& path,
       return std::make_unique<GlbSink>(name, force, GlbOptions{.quantize = options.quantize});
     case MeshFormat::vtp: return std::make_unique<VtpSink>(name, force);
     case MeshFormat::pvtp: return std::make_unique<PvtpSink>(name, force);
+    case MeshFormat::neuroglancer:
+      return create_neuroglancer_mesh(path, force, options.sharded,
+                                      {.levels = options.levels,
+                                       .threads = options.threads,
+                                       .memory = level_share(options.memory)});
   }
   throw UsageError("no such format of a mesh");
 }
@@ -91,6 +116,8 @@ std::uint64_t mesh_file_memory(MeshFormat format, int threads, std::uint64_t mem
     case MeshFormat::obj: return ObjSink::memory_with(threads);
     case MeshFormat::glb: return part_memory(GlbOptions{}.part_triangles);
     case MeshFormat::pvtp: return part_memory(PvtpSink::kPartTriangles);
+    case MeshFormat::neuroglancer:
+      return level_memory({.threads = threads, .memory = level_share(memory)});
     default: return 0;
   }
 }

@@ -21,7 +21,7 @@ const std::map<std::string, Names> kMayInclude = {
     {"io/bytes", {"core"}},
     {"io/vtk", {"core", "io/bytes"}},
     {"io/volumes", {"core", "io/bytes", "io/vtk"}},
-    {"io/meshes", {"core", "io/bytes", "io/vtk", "isobrick/mesh.h"}},
+    {"io/meshes", {"core", "io/bytes", "io/vtk", "filters", "isobrick/mesh.h"}},
     {"filters", {"core", "io/bytes", "isobrick/mesh.h", "isobrick/mesh_sinks.h"}},
     {"io/http", {"core", "io/bytes"}},
     {"packed", {"core"}},

@@ -1,0 +1,75 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <string_view>
+#include <vector>
+
+#include "filters/mesh_spool.h"
+#include "filters/scratch_array.h"
+#include "io/meshes/levels/chunk_lattice.h"
+
+namespace isobrick::inline v0 {
+
+/// A number of a cell's place whose order is the Z-curve: bit 0 of x, of y, of z, bit 1 of x and so
+/// on.
+std::uint64_t z_order_key(const GridCell& cell);
+/// The cell of a key.
+GridCell cell_of_key(std::uint64_t key);
+
+/// A fragment of a level that has triangles.
+struct EncodedFragment {
+  std::uint64_t key = 0;    ///< z_order_key of its place
+  std::uint32_t bytes = 0;  ///< of its mesh as Draco has it
+  /// Bit x + 2y + 4z: the half of each axis has triangles. On level 0 bit 0.
+  std::uint8_t halves = 0;
+};
+
+/// How a level is encoded.
+struct FragmentWork {
+  ScratchPlace place;
+  std::uint64_t memory = 0;  ///< of the triangles that are sorted, in bytes
+  std::uint64_t triangles_at_once = 0;
+  int threads = 0;  ///< 0: all cores
+  std::function<void()> check_cancelled = [] {};
+};
+
+/// The triangles of a level's mesh, sorted by the fragments that they touch.
+class LevelFragments {
+ public:
+  /// `mesh` and what `work` names must outlive it.
+  LevelFragments(MeshSpool& mesh, const ChunkGrid& grid, int level, const FragmentWork& work);
+
+  /// Triangles of the fragment with most of them.
+  std::uint64_t largest() const;
+
+  /// Calls write(bytes) with the encoded mesh of each fragment, in the order of their keys, and
+  /// lists them. The bytes depend on nothing but the mesh and the grid.
+  std::vector<EncodedFragment> encode(const std::function<void(std::string_view)>& write);
+  /// Bytes of the scratch file.
+  std::uint64_t file_bytes() const { return sorted_.file_bytes(); }
+
+ private:
+  /// The triangles of a fragment among the sorted ones.
+  struct Run {
+    std::uint64_t begin = 0, end = 0;
+    std::uint64_t size() const { return end - begin; }
+  };
+
+  /// Calls f(triangle, run) for each triangle and each fragment that it touches.
+  template <class F>
+  void for_each_touched(F&& f);
+  void sort();
+  LatticeTriangle on_lattice(const Triangle& triangle);
+  std::vector<std::array<Vec3f, 3>> load(const Run& run);
+
+  MeshSpool& mesh_;
+  ChunkGrid grid_;
+  int level_;
+  const FragmentWork& work_;
+  std::map<std::uint64_t, Run> runs_;  ///< by the fragment's key
+  ScratchArray<Triangle> sorted_;
+};
+
+}  // namespace isobrick

@@ -1,0 +1,168 @@
+#include "io/meshes/levels/segment_sink.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include <isobrick/mesh_file_sink.h>
+#include <isobrick/mesh_filters.h>
+#include "io/meshes/levels/draco_mesh.h"
+
+namespace isobrick::inline v0 {
+namespace {
+
+constexpr std::uint64_t kMiB = std::uint64_t{1} << 20;
+
+/// The edge of a fragment, in edges of the mesh's triangles: a surface through it has some
+/// thousands. 16 bits then tell positions apart to a thousandth of an edge.
+constexpr double kFragmentEdges = 64;
+/// A fragment with more triangles is divided, so that viewers load little at a time.
+constexpr std::uint64_t kMaxFragmentTriangles = 200'000;
+/// A quarter of the triangles doubles their edges, as a fragment's edge doubles.
+constexpr double kLevelRatio = 0.25;
+/// A level must have fewer triangles than this part of the one before.
+constexpr double kWorthRatio = 0.8;
+
+/// What the simplification takes beside the memory of its options, and what encoding takes in its
+/// place: MeshFilterOptions::memory.
+constexpr std::uint64_t kWorkBytes = 120 * kMiB;
+/// A triangle's, while it is cut, welded and encoded.
+constexpr std::uint64_t kTriangleBytes = 400;
+
+/// Takes a mesh into a spool.
+class SpoolSink final : public MeshSink {
+ public:
+  explicit SpoolSink(MeshSpool& spool) : spool_(spool) {}
+
+  Indexing indexing() const override { return Indexing::welded; }
+  void begin(const MeshHeader& header) override { spool_.begin(header); }
+  void write(const MeshChunk& chunk) override { spool_.append(chunk); }
+  void finish() override {}
+  std::uint64_t bytes() const override { return spool_.bytes(); }
+
+ private:
+  MeshSpool& spool_;
+};
+
+double area_of(const Vec3f& a, const Vec3f& b, const Vec3f& c) {
+  const double ux = double{b.x} - a.x, uy = double{b.y} - a.y, uz = double{b.z} - a.z;
+  const double vx = double{c.x} - a.x, vy = double{c.y} - a.y, vz = double{c.z} - a.z;
+  return std::hypot(uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx) / 2;
+}
+
+}  // namespace
+
+std::uint64_t level_memory(const LevelOptions& options) { return options.memory + kWorkBytes; }
+
+std::uint64_t level_share(std::uint64_t budget) {
+  return std::clamp(budget / 8, 16 * kMiB, 1024 * kMiB);
+}
+
+SegmentSink::SegmentSink(FileWriter& fragments, const LevelOptions& options, Finish finish)
+    : fragments_(fragments),
+      options_(options),
+      finish_(std::move(finish)),
+      place_{.beside = options.scratch_beside.string()},
+      mesh_(make_spool()) {
+  check_draco();
+}
+
+MeshSpool SegmentSink::make_spool() const { return MeshSpool(place_, options_.memory / 4); }
+
+void SegmentSink::begin(const MeshHeader& header) {
+  unit_ = header.unit;
+  mesh_.begin({});
+}
+
+void SegmentSink::write(const MeshChunk& chunk) {
+  MeshChunk plain = chunk;
+  plain.normals = {};
+  mesh_.append(plain);
+}
+
+SegmentSink::Extent SegmentSink::measure(MeshSpool& mesh) const {
+  constexpr double far = std::numeric_limits<double>::infinity();
+  Extent extent{.bounds = {{far, far, far}, {-far, -far, -far}}};
+  double area = 0;
+  mesh.triangles().for_each_run([&](std::span<const Triangle> run, std::uint64_t) {
+    for (const Triangle& t : run) {
+      const Vec3f corners[3] = {mesh.positions()[t[0]], mesh.positions()[t[1]],
+                                mesh.positions()[t[2]]};
+      area += area_of(corners[0], corners[1], corners[2]);
+      for (const Vec3f& p : corners)
+        for (int axis = 0; axis < 3; ++axis) {
+          extent.bounds.lo[axis] = std::min<double>(extent.bounds.lo[axis], p[axis]);
+          extent.bounds.hi[axis] = std::max<double>(extent.bounds.hi[axis], p[axis]);
+        }
+    }
+  });
+  const auto triangles = static_cast<double>(mesh.triangles().size());
+  extent.edge = std::sqrt(area / std::max(1.0, triangles) * 4 / std::sqrt(3.0));
+  return extent;
+}
+
+void SegmentSink::choose_grid(const Extent& extent) {
+  // Triangles of very different sizes may crowd in a fragment.
+  constexpr int most_divisions = 6;
+  double edge = kFragmentEdges * extent.edge;
+  for (int i = 0;; ++i, edge /= 2) {
+    grid_ = make_chunk_grid(extent.bounds, edge);
+    if (i == most_divisions) return;
+    const FragmentWork work{.place = place_, .memory = options_.memory / 8};
+    if (LevelFragments(mesh_, grid_, 0, work).largest() <= kMaxFragmentTriangles) return;
+  }
+}
+
+void SegmentSink::write_level(MeshSpool& mesh, int level, double scale) {
+  const FragmentWork work{.place = place_,
+                          .memory = options_.memory / 4,
+                          .triangles_at_once = kWorkBytes / kTriangleBytes,
+                          .threads = options_.threads};
+  const std::uint64_t before = fragments_.size();
+  LevelFragments fragments(mesh, grid_, level, work);
+  ManifestLevel& entry = manifest_.emplace_back();
+  entry.fragments = fragments.encode([&](std::string_view bytes) { fragments_.append(bytes); });
+  // 0 would stand for a level that is not there.
+  entry.scale = scale > 0 ? static_cast<float>(scale) : grid_.edge;
+  if (level > 0) entry.scale = std::max(entry.scale, manifest_[manifest_.size() - 2].scale);
+  written_.push_back({mesh.size(), entry.fragments.size(), fragments_.size() - before});
+}
+
+bool SegmentSink::simplify() {
+  const std::uint64_t before = mesh_.size().triangles;
+  MeshSpool simpler = make_spool();
+  SpoolSink sink(simpler);
+  MeshFilter filter(sink, {.simplify_ratio = kLevelRatio,
+                           .threads = options_.threads,
+                           .memory = options_.memory / 4,
+                           .scratch_beside = options_.scratch_beside});
+  filter.begin({});
+  mesh_.replay_and_release(filter);
+  filter.finish();
+  mesh_ = std::move(simpler);
+  return static_cast<double>(mesh_.size().triangles) < kWorthRatio * static_cast<double>(before);
+}
+
+void SegmentSink::finish() {
+  if (mesh_.size().triangles > 0) {
+    Extent extent = measure(mesh_);
+    choose_grid(extent);
+    const int levels = options_.levels > 0 ? options_.levels : grid_.levels();
+    for (int level = 0;;) {
+      write_level(mesh_, level, extent.edge);
+      if (++level == std::min(levels, kMaxMeshLevels) || !simplify()) break;
+      extent = measure(mesh_);
+    }
+  }
+  mesh_.release();
+  // Readers take neither a segment without levels nor a level without fragments.
+  if (manifest_.empty()) manifest_.push_back({.scale = 1});
+  if (manifest_.front().fragments.empty()) manifest_.front().fragments.push_back({});
+  complete_octree(manifest_);
+  finish_(manifest_bytes(grid_, manifest_));
+}
+
+std::uint64_t SegmentSink::bytes() const { return mesh_.bytes() + fragments_.size(); }
+
+}  // namespace isobrick
