@@ -62,6 +62,8 @@ std::vector<Sinks> open_sinks(const std::vector<ExtractedSurface>& surfaces,
       of_surface.mesh =
           create_mesh_file(surface.output, {.format = surface.form.format,
                                             .quantize = surface.form.quantize,
+                                            .levels = surface.form.levels,
+                                            .sharded = surface.form.sharded,
                                             .force = force,
                                             .threads = arguments.threads,
                                             .memory = memory_of_mesh(surface, surfaces.size())});
@@ -284,14 +286,21 @@ void add_level_options(CLI::App* app, ExtractArguments& arguments) {
 
 void add_outputs(CLI::App* app, ExtractArguments& arguments) {
   add_output(app, arguments.output, "MESH",
-             "Mesh to write, .ply, .stl, .obj, .glb, .vtp or .pvtp; several isovalues make "
-             "head_500.ply and so on; - for standard output",
+             "Mesh to write, .ply, .stl, .obj, .glb, .vtp, .pvtp or .neuroglancer; several "
+             "isovalues make head_500.ply and so on; - for standard output",
              "head_500.ply of head.zarr, unless --preview or --estimate is all");
-  add_parsed(
-      app, arguments.format, parse_mesh_format,
-      {"--format", "ply|stl|obj|glb|vtp|pvtp", "Format of the mesh", "by its extension, or ply"});
+  add_parsed(app, arguments.format, parse_mesh_format,
+             {"--format", "ply|stl|obj|glb|vtp|pvtp|neuroglancer", "Format of the mesh",
+              "by its extension, or ply"});
   add_flag(app, "--quantize", arguments.quantize,
            "GLB with positions and normals of 16 bits (KHR_mesh_quantization)");
+  add_parsed(app, arguments.levels, parse_detail_levels,
+             {"--levels", "auto|N",
+              "Levels of detail of neuroglancer's format at most, each with a quarter of the "
+              "triangles of the one before; auto: until one part has the whole mesh",
+              "auto"});
+  add_flag(app, "--sharded", arguments.sharded,
+           "neuroglancer's format in few large files, in place of two for each mesh");
   add_text(app, {"--preview", "PNG", "Draw a shaded picture of the surface; - for standard output"},
            [&preview = arguments.preview.path](const std::string& text) { preview = text; });
   add_picture_size(app, arguments.preview.size);

@@ -12,8 +12,10 @@
 
 #include <isobrick/error.h>
 #include "io/bytes/folder_output.h"
+#include "io/bytes/folder_walk.h"
 #include "io/bytes/output_file.h"
 #include "io/bytes/output_guard.h"
+#include "io/meshes/levels/neuroglancer_folder.h"
 #include "pipeline/program_memory.h"
 #include "tools/format.h"
 #include "tools/label_report.h"
@@ -43,12 +45,19 @@ std::int64_t parse_label(std::string_view text) {
 
 /// Whether a file may be part of an output: a mesh of a label, or the list.
 bool is_own_name(std::string_view name) {
-  if (name == kListName) return true;
+  if (name == kListName || NeuroglancerFolder::is_own_name(name)) return true;
   const std::size_t dot = name.find('.');
   if (dot == name.npos || !find_mesh_format(name.substr(dot))) return false;
   std::string_view label = name.substr(0, dot);
   if (label.starts_with('-')) label.remove_prefix(1);
   return !label.empty() && label.find_first_not_of("0123456789") == label.npos;
+}
+
+/// The format of the meshes.
+MeshFormat format_of(const ExtractArguments& arguments) {
+  if (arguments.format) return *arguments.format;
+  const auto of_name = find_mesh_format(without_slash(arguments.output).extension().string());
+  return of_name && has_levels(*of_name) ? *of_name : MeshFormat::ply;
 }
 
 /// Options that say how an isosurface is made.
@@ -80,13 +89,18 @@ void check_label_arguments(const ExtractArguments& arguments) {
     throw UsageError("PVTP has several files for a mesh; choose another --format for labels");
   if (arguments.quantize && arguments.format != MeshFormat::glb)
     throw UsageError("--quantize is for GLB only: add --format glb");
+  check_levels(
+      {.format = format_of(arguments), .levels = arguments.levels, .sharded = arguments.sharded});
 }
 
 std::string folder_name(const ExtractArguments& arguments) {
   if (arguments.output.empty())
     return stem_of_input(arguments.input.path, arguments.input.volume) + "_labels";
-  refuse_misleading_name(arguments.output, {},
-                         "--labels writes a folder with a mesh for each label");
+  const std::string_view own = extension_of(MeshFormat::neuroglancer);
+  refuse_misleading_name(
+      arguments.output,
+      std::span(&own, has_levels(format_of(arguments)) ? std::size_t{1} : std::size_t{0}),
+      "--labels writes a folder with a mesh for each label");
   return arguments.output;
 }
 
@@ -103,9 +117,15 @@ VisitPlan plan_visits(const ExtractArguments& arguments, const MeshFilterOptions
   std::uint64_t each = buffers + least;
   if (filter.any()) each += least;
   if (filter.simplifies()) each += simplification;
+  if (has_levels(format_of(arguments))) each += mesh_file_memory(format_of(arguments), 1, least);
   // A quarter of the budget is that of the labels.
   const std::uint64_t budget =
       arguments.memory - arguments.memory / 4 - std::min(arguments.memory / 4, kProgramBytes);
+  if (has_levels(format_of(arguments)) && budget < each)
+    throw UsageError(fmt::format(
+        "a memory budget of {:.1f} MiB is too small for levels of detail: at least --memory {}M is "
+        "needed",
+        in_mib(arguments.memory), mib_above((each + kProgramBytes) / 3 * 4)));
   VisitPlan plan;
   plan.visits = static_cast<int>(
       std::clamp<std::uint64_t>(budget / each, 1, static_cast<std::uint64_t>(threads)));
@@ -121,6 +141,7 @@ class LabelWriter {
  public:
   LabelWriter(const ExtractArguments& arguments, const StoreReader& store, fs::path folder)
       : arguments_(arguments),
+        format_(format_of(arguments)),
         store_(store),
         folder_(std::move(folder)),
         list_((folder_ / kListName).string(), false) {
@@ -132,21 +153,18 @@ class LabelWriter {
     plan_ = plan_visits(arguments, filter_);
     filter_.memory = plan_.filter_bytes;
     filter_.threads = 1;
+    if (has_levels(format_)) segments_.emplace(folder_, arguments.sharded);
   }
 
   int visits() const { return plan_.visits; }
 
   void write(const LabelMesh& mesh) {
-    const MeshFormat format = arguments_.format.value_or(MeshFormat::ply);
-    const std::string name = fmt::format("{}{}", mesh.label(), isobrick::extension_of(format));
-    const auto sink = create_mesh_file(folder_ / name, {.format = format,
-                                                        .quantize = arguments_.quantize,
-                                                        .threads = 1,
-                                                        .memory = plan_.mesh_bytes});
+    const std::string name = file_of(mesh.label());
+    const std::unique_ptr<MeshSink> sink = open_sink(mesh.label(), name);
     ordered_json entry{{"label", mesh.label()}};
     if (const LabelProperties* properties = find_properties(mesh.label()))
       add_properties(entry, *properties);
-    entry["file"] = name;
+    entry["file"] = arguments_.sharded ? ordered_json() : ordered_json(name);
     MeshSize size = mesh.size();
     if (filter_.any()) {
       MeshFilterOptions options = filter_;
@@ -159,17 +177,21 @@ class LabelWriter {
       mesh.write(*sink);
     }
     entry["triangles"] = size.triangles;
-    entry["vertices"] = has_vertices(format) ? ordered_json(size.vertices) : ordered_json();
+    entry["vertices"] = has_vertices(format_) ? ordered_json(size.vertices) : ordered_json();
     const std::lock_guard lock(mutex_);
     written_.vertices += size.vertices;
     written_.triangles += size.triangles;
-    bytes_ += sink->bytes();
+    if (!segments_) bytes_ += sink->bytes();
     entries_.emplace(mesh.index(), entry.dump());
     write_entries();
   }
 
   /// Ends the list.
   void finish() {
+    if (segments_) {
+      segments_->finish();
+      bytes_ += segments_->bytes();
+    }
     FileWriter& out = list_.writer();
     out.append("\n]}\n");
     bytes_ += out.size();
@@ -180,6 +202,26 @@ class LabelWriter {
   std::uint64_t bytes() const { return bytes_; }
 
  private:
+  std::string file_of(std::int64_t label) const {
+    return fmt::format("{}{}", label, segments_ ? "" : isobrick::extension_of(format_));
+  }
+
+  std::unique_ptr<MeshSink> open_sink(std::int64_t label, const std::string& name) {
+    if (!segments_)
+      return create_mesh_file(folder_ / name, {.format = format_,
+                                               .quantize = arguments_.quantize,
+                                               .threads = 1,
+                                               .memory = plan_.mesh_bytes});
+    if (label < 0)
+      throw UsageError(fmt::format(
+          "neuroglancer has no negative segments such as {}: leave them out of --labels", label));
+    SegmentProperties properties;
+    if (const LabelProperties* known = find_properties(label))
+      properties = {known->name, known->colour};
+    return segments_->segment(static_cast<std::uint64_t>(label),
+                              {.levels = arguments_.levels, .threads = 1}, properties);
+  }
+
   /// Writes those that come next, in the order of the labels.
   void write_entries() {
     while (!entries_.empty() && entries_.begin()->first == entries_written_) {
@@ -200,10 +242,12 @@ class LabelWriter {
   }
 
   const ExtractArguments& arguments_;
+  MeshFormat format_;
   const StoreReader& store_;
   fs::path folder_;
   MeshFilterOptions filter_;
   VisitPlan plan_;
+  std::optional<NeuroglancerFolder> segments_;  ///< in place of a file each
   std::mutex mutex_;
   OutputFile list_;
   std::map<std::uint64_t, std::string> entries_;  ///< that wait for those before them

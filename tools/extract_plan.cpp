@@ -38,7 +38,10 @@ fs::path default_output(const ExtractArguments& arguments, MeshFormat format, do
 
 /// How the mesh is written, or would be if it had a name.
 MeshForm form_of(const ExtractArguments& arguments) {
-  MeshForm form{.quantize = arguments.quantize, .attributes = arguments.attributes.size()};
+  MeshForm form{.quantize = arguments.quantize,
+                .levels = arguments.levels,
+                .sharded = arguments.sharded,
+                .attributes = arguments.attributes.size()};
   if (arguments.format)
     form.format = *arguments.format;
   else if (!arguments.output.empty())
@@ -48,6 +51,7 @@ MeshForm form_of(const ExtractArguments& arguments) {
   if (form.quantize && form.format != MeshFormat::glb)
     throw UsageError(
         fmt::format("--quantize is for GLB only, and this mesh becomes {}", name_of(form.format)));
+  check_levels(form);
   if (form.attributes > 0 && !has_attributes(form.format))
     throw UsageError(
         fmt::format("--attribute: {} cannot hold attributes of vertices; choose PLY, VTP, PVTP or "
@@ -304,9 +308,10 @@ void check_outputs(const ExtractArguments& arguments) {
   for (const IsovalueRequest& request : arguments.isovalues) {
     if (names_need_values && needs_histogram(request)) continue;
     if (!arguments.output.empty())
-      check_can_write(named(arguments.output, request.number, count), arguments.force);
+      check_can_write_mesh(named(arguments.output, request.number, count), format, arguments.force);
     else if (arguments.writes_mesh())
-      check_can_write(default_output(arguments, format, request.number), arguments.force);
+      check_can_write_mesh(default_output(arguments, format, request.number), format,
+                           arguments.force);
   }
   if (!arguments.preview.path.empty() && count == 1)
     check_can_write(arguments.preview.path, arguments.force);

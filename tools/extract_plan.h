@@ -25,6 +25,8 @@ struct ExtractArguments {
   PreviewRequest preview;
   std::optional<MeshFormat> format;  ///< of the output; nothing: by its name
   bool quantize = false;
+  int levels = 0;        ///< of detail, of formats that have them; 0: by the mesh
+  bool sharded = false;  ///< neuroglancer
   bool level_given = false;
   std::optional<int> level = 0;                ///< nothing: the finest that is small enough
   std::optional<std::uint64_t> max_triangles;  ///< of all surfaces; chooses the level

@@ -8,6 +8,7 @@
 #include "io/meshes/mesh_parts.h"
 #include "tools/format.h"
 #include "tools/output_name.h"
+#include "tools/parse.h"
 
 namespace isobrick::tools {
 
@@ -15,16 +16,20 @@ namespace fs = std::filesystem;
 
 MeshFormat mesh_format(const fs::path& path) {
   if (is_standard_output(path.native())) return MeshFormat::ply;
-  if (const auto format = find_mesh_format(path.extension().string())) return *format;
+  if (const auto format = find_mesh_format(without_slash(path).extension().string()))
+    return *format;
   throw UsageError(
-      fmt::format("'{}' is no mesh that can be written; name it .ply, .stl, .obj, .glb, .vtp or "
-                  ".pvtp, or add --format",
+      fmt::format("'{}' is no mesh that can be written; name it .ply, .stl, .obj, .glb, .vtp, "
+                  ".pvtp or .neuroglancer, or add --format",
                   path.string()));
 }
 
 void check_mesh_name(const fs::path& path, MeshFormat format) {
   const std::string_view extension = isobrick::extension_of(format);
   if (is_standard_output(path.native())) {
+    if (has_levels(format))
+      throw UsageError(fmt::format("{} is a folder, which standard output cannot take: name it",
+                                   name_of(format)));
     if (format != MeshFormat::pvtp) return;
     throw UsageError(
         "PVTP has several files, which standard output cannot take: name a file, or add --format "
@@ -37,12 +42,41 @@ void check_mesh_name(const fs::path& path, MeshFormat format) {
 
 MeshFormat parse_mesh_format(const std::string& text) {
   if (const auto format = find_mesh_format("." + text)) return *format;
-  throw UsageError(
-      fmt::format("'{}' is no format of a mesh; it is ply, stl, obj, glb, vtp or pvtp", text));
+  throw UsageError(fmt::format(
+      "'{}' is no format of a mesh; it is ply, stl, obj, glb, vtp, pvtp or neuroglancer", text));
+}
+
+void check_levels(const MeshForm& form) {
+  const char* option = form.levels > 0 ? "--levels" : form.sharded ? "--sharded" : nullptr;
+  if (option && !has_levels(form.format))
+    throw UsageError(fmt::format(
+        "{} is for neuroglancer only, and this mesh becomes {}: add --format neuroglancer", option,
+        name_of(form.format)));
+}
+
+void check_can_write_mesh(const fs::path& path, MeshFormat format, bool force) {
+  const fs::path name = without_slash(path);
+  std::error_code none;
+  if (!has_levels(format) || !fs::is_directory(name, none))
+    check_can_write(name, force);
+  else if (!force)
+    throw UsageError(fmt::format("'{}' exists already; add --force to replace it", path.string()));
+}
+
+int parse_detail_levels(const std::string& text) {
+  return text == "auto" ? 0 : parse_int(text, 1, kMaxMeshLevels);
 }
 
 std::uint64_t mesh_bytes(const fs::path& path) {
-  std::uint64_t bytes = fs::file_size(path);
+  std::uint64_t bytes = 0;
+  if (fs::is_directory(path)) {
+    walk_folder(path, [&](const fs::path& name, fs::file_type type) {
+      if (type == fs::file_type::regular) bytes += fs::file_size(path / name);
+      return true;
+    });
+    return bytes;
+  }
+  bytes = fs::file_size(path);
   for (const fs::path& folder : part_folders(path))
     for (const FolderEntry& part : folder_entries(folder))
       bytes += fs::file_size(folder / part.name);
@@ -50,10 +84,11 @@ std::uint64_t mesh_bytes(const fs::path& path) {
 }
 
 fs::path with_isovalue(const fs::path& path, double isovalue) {
-  fs::path name = path.stem();
+  const fs::path plain = without_slash(path);
+  fs::path name = plain.stem();
   name += fmt::format("_{}", isovalue);
-  name += path.extension();
-  return path.parent_path() / name;
+  name += plain.extension();
+  return plain.parent_path() / name;
 }
 
 }  // namespace isobrick::tools

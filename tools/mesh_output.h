@@ -13,16 +13,27 @@ struct MeshForm {
   MeshFormat format = MeshFormat::ply;
   bool normals = false;
   bool quantize = false;       ///< 16 bits a number; GLB only
+  int levels = 0;              ///< of detail; 0: by the mesh
+  bool sharded = false;        ///< neuroglancer only
   std::size_t attributes = 0;  ///< a float each at a vertex
 };
 
 /// By the name's extension; PLY on standard output. Throws UsageError for any other.
 MeshFormat mesh_format(const std::filesystem::path& path);
-/// Throws UsageError where the name has the extension of another format, or standard output where
-/// that has several files.
+/// Throws UsageError where the name has the extension of another format, or is standard output and
+/// the format has several files.
 void check_mesh_name(const std::filesystem::path& path, MeshFormat format);
 /// By a word such as "ply". Throws UsageError for any other.
 MeshFormat parse_mesh_format(const std::string& text);
+
+/// Throws UsageError for levels of detail and shards that the format has not.
+void check_levels(const MeshForm& form);
+
+/// Throws as check_can_write(), and for a folder where it exists and `force` is not set.
+void check_can_write_mesh(const std::filesystem::path& path, MeshFormat format, bool force);
+
+/// "auto" (0) or a number of levels of detail. Throws UsageError for any other.
+int parse_detail_levels(const std::string& text);
 
 /// Bytes of a finished mesh, its parts included.
 std::uint64_t mesh_bytes(const std::filesystem::path& path);
