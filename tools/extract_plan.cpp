@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include <isobrick/error.h>
+#include "io/bytes/folder_walk.h"
 #include "io/bytes/leftovers.h"
 #include "pipeline/program_memory.h"
 #include "tools/format.h"
@@ -22,6 +23,11 @@ namespace fs = std::filesystem;
 
 /// Triangles of --level auto where no number is given.
 constexpr std::uint64_t kAutomaticTriangles = 20'000'000;
+
+/// A folder's name without the slash that it may end in.
+fs::path plain_name(const fs::path& path, MeshFormat format) {
+  return has_levels(format) ? without_slash(path) : path;
+}
 
 /// `path`, with the isovalue in its name when there are several.
 fs::path named(const std::string& path, double isovalue, std::size_t count) {
@@ -179,7 +185,8 @@ std::vector<ExtractedSurface> surfaces_of_level(const ExtractArguments& argument
   for (const double isovalue : isovalues) {
     options.isovalue = isovalue;
     const fs::path output =
-        !arguments.output.empty() ? named(arguments.output, isovalue, isovalues.size())
+        !arguments.output.empty()
+            ? plain_name(named(arguments.output, isovalue, isovalues.size()), form.format)
         : arguments.writes_mesh() ? default_output(arguments, form.format, isovalue)
                                   : fs::path();
     surfaces.push_back({options, form, output,

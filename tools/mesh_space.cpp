@@ -44,11 +44,10 @@ MeshBytes predict_bytes(const MeshForm& form, MeshSize size) {
       return {file, file + rows + t * triangle};
     }
     case MeshFormat::neuroglancer: {
-      // A coarser level has a quarter of the triangles; all together have a third more.
-      constexpr std::uint64_t encoded = 7;
-      const std::uint64_t file = header + t * encoded + t * encoded / 3;
-      const std::uint64_t mesh = v * vector + t * triangle;
-      return {file, 2 * file + 2 * mesh + 2 * t * triangle};
+      // A triangle takes about 2.5 bytes, and all coarser levels a third of level 0. Scratch files
+      // hold the mesh, its simplification and sorted triangles.
+      const std::uint64_t file = header + t * 10 / 3, mesh = v * vector + t * triangle;
+      return {file, 2 * file + 2 * mesh + 2 * t * triangle + v * 24};
     }
   }
   return {};

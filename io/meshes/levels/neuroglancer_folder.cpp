@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include <isobrick/error.h>
 #include "core/length_unit.h"
 #include "io/bytes/folder_output.h"
 #include "io/meshes/levels/draco_mesh.h"
@@ -166,7 +167,9 @@ void NeuroglancerFolder::write_properties() {
   const ordered_json info{
       {"@type", "neuroglancer_segment_properties"},
       {"inline", {{"ids", std::move(ids)}, {"properties", std::move(properties)}}}};
-  fs::create_directory(folder_ / kProperties);
+  std::error_code failure;
+  if (!fs::create_directory(folder_ / kProperties, failure) && failure)
+    throw system_error("create the folder", (folder_ / kProperties).string(), failure.value());
   bytes_ += write_text(folder_ / kPropertiesInfo, info.dump() + "\n");
 }
 

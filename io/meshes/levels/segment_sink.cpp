@@ -5,7 +5,6 @@
 #include <limits>
 #include <utility>
 
-#include <isobrick/mesh_file_sink.h>
 #include <isobrick/mesh_filters.h>
 #include "io/meshes/levels/draco_mesh.h"
 
@@ -56,7 +55,8 @@ double area_of(const Vec3f& a, const Vec3f& b, const Vec3f& c) {
 std::uint64_t level_memory(const LevelOptions& options) { return options.memory + kWorkBytes; }
 
 std::uint64_t level_share(std::uint64_t budget) {
-  return std::clamp(budget / 8, 16 * kMiB, 1024 * kMiB);
+  // No more of a small budget, whatever it is: so a budget that is called enough is enough.
+  return budget < 512 * kMiB ? 16 * kMiB : std::min(budget / 8, 1024 * kMiB);
 }
 
 SegmentSink::SegmentSink(FileWriter& fragments, const LevelOptions& options, Finish finish)
@@ -151,7 +151,7 @@ void SegmentSink::finish() {
     const int levels = options_.levels > 0 ? options_.levels : grid_.levels();
     for (int level = 0;;) {
       write_level(mesh_, level, extent.edge);
-      if (++level == std::min(levels, kMaxMeshLevels) || !simplify()) break;
+      if (++level == levels || !simplify()) break;
       extent = measure(mesh_);
     }
   }
