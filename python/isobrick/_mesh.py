@@ -120,7 +120,8 @@ class Mesh:
         Parameters
         ----------
         path : str or path
-            The extension is the format: .ply, .stl, .obj, .glb, .vtp or .pvtp.
+            The extension is the format: .ply, .stl, .obj, .glb, .vtp, .pvtp or
+            .neuroglancer, a folder of levels of detail.
         force : bool
             Replaces a file that exists; otherwise that is a UsageError.
         quantize : bool
