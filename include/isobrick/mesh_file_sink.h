@@ -44,7 +44,7 @@ struct MeshFileOptions {
   int levels = 0;
   bool sharded = false;  ///< neuroglancer: few large files
   bool force = false;    ///< replaces a file that exists
-  int threads = 0;                        ///< that may help to write; 0: all cores
+  int threads = 0;       ///< that may help to write; 0: all cores
   /// Bytes of the whole operation's budget, of which the sink takes a small part
   /// (MeshSink::memory).
   std::uint64_t memory = std::uint64_t{1} << 30;
@@ -52,9 +52,9 @@ struct MeshFileOptions {
 
 /// Opens a mesh file for extract(). It has its name once it is finished; a sink that is destroyed
 /// before leaves nothing. The name "-" is standard output, which is written to once the mesh is
-/// finished, of OBJ sooner; PVTP and folders cannot go there. Throws UsageError when the file exists
-/// and `force` is not set, its name has no known extension, options do not fit the format or the
-/// format needs a library that is not there; Error when it cannot be made.
+/// finished, of OBJ sooner; PVTP and folders cannot go there. Throws UsageError when the file
+/// exists and `force` is not set, its name has no known extension, options do not fit the format or
+/// the format needs a library that is not there; Error when it cannot be made.
 ISOBRICK_API std::unique_ptr<MeshSink> create_mesh_file(const std::filesystem::path& path,
                                                         const MeshFileOptions& options);
 

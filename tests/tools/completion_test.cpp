@@ -44,7 +44,7 @@ TEST_F(Completion, OfBash) {
   EXPECT_EQ(completed("isobrick convert --codec ''", 3), "zstd packed none\n");
   EXPECT_EQ(completed("isobrick extract --iso", 2), "--isovalue\n");
   EXPECT_EQ(completed("isobrick extract --isovalue 5 --iso", 4), "--isovalue\n");
-  EXPECT_EQ(completed("isobrick extract --level 0 --lev", 4), "\n");
+  EXPECT_EQ(completed("isobrick extract --level 0 --lev", 4), "--levels\n");
   EXPECT_EQ(completed("isobrick extract -o a.ply --outp", 4), "\n");
   EXPECT_EQ(completed("isobrick extract --level ''", 3), "auto\n");
   EXPECT_EQ(completed("isobrick extract -o ''", 3), "script\n");
