@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <fstream>
+#include <random>
 #include <set>
 
 #include <isobrick/error.h>
@@ -19,6 +20,9 @@ namespace fs = std::filesystem;
 
 using Cells = std::set<GridCell>;
 
+/// Where neuroglancer's decoder parts fragments.
+constexpr std::int64_t kMiddle = 32768;
+
 /// Fails unless a level's fragments are in the order of the Z-curve, each once, and their triangles
 /// cross no middle.
 void check_level(const DecodedLevel& level, bool has_halves) {
@@ -30,8 +34,7 @@ void check_level(const DecodedLevel& level, bool has_halves) {
     if (!has_halves) continue;
     for (const Triangle& t : fragment.triangles)
       for (std::size_t axis = 0; axis < 3; ++axis) {
-        const std::int64_t middle =
-            std::int64_t{fragment.cell[axis]} * ChunkGrid::kSteps + ChunkGrid::kMiddle;
+        const std::int64_t middle = std::int64_t{fragment.cell[axis]} * ChunkGrid::kSteps + kMiddle;
         int sides = 0;
         for (const std::uint32_t v : t) {
           const std::int64_t x = fragment.points[v][axis];
@@ -60,7 +63,7 @@ void check_octree(const DecodedMesh& mesh) {
           std::int64_t lo = fragment.points[t[0]][axis];
           for (const std::uint32_t v : t) lo = std::min(lo, fragment.points[v][axis]);
           const std::int64_t middle =
-              std::int64_t{fragment.cell[axis]} * ChunkGrid::kSteps + ChunkGrid::kMiddle;
+              std::int64_t{fragment.cell[axis]} * ChunkGrid::kSteps + kMiddle;
           half[axis] = 2 * fragment.cell[axis] + (lo >= middle ? 1 : 0);
         }
         EXPECT_TRUE(children.contains(half)) << "level " << level;
@@ -102,6 +105,36 @@ TEST_F(Neuroglancer, EveryLevelIsTheClosedMesh) {
     triangles = of_level.triangles();
   }
   check_octree(decoded);
+}
+
+/// A rough sheet just below the plane z = 0.5, which a few vertices cross, and a tetrahedron at z =
+/// 0.
+Mesh sheet_below_a_plane() {
+  constexpr std::uint32_t n = 512;
+  std::mt19937 random(3);
+  std::uniform_real_distribution<float> height(0.4985F, 0.49999F);
+  std::vector<Vec3f> positions{{0, 0, 0}, {0.01F, 0, 0}, {0, 0.01F, 0}, {0, 0, 0.01F}};
+  std::vector<Triangle> triangles{{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {2, 0, 3}};
+  for (std::uint32_t i = 0; i <= n; ++i)
+    for (std::uint32_t k = 0; k <= n; ++k)
+      positions.push_back({static_cast<float>(i) / n, static_cast<float>(k) / n,
+                           i % 64 == 32 && k % 64 == 32 ? 0.50001F : height(random)});
+  for (std::uint32_t i = 0; i < n; ++i)
+    for (std::uint32_t k = 0; k < n; ++k) {
+      const std::uint32_t a = 4 + i * (n + 1) + k, b = a + n + 1;
+      triangles.push_back({a, b, b + 1});
+      triangles.push_back({a, b + 1, a + 1});
+    }
+  return mesh_of(positions, triangles);
+}
+
+TEST_F(Neuroglancer, TheOctreeIsCompleteWhereACoarseLevelMissesCells) {
+  const DecodedMesh decoded = save(sheet_below_a_plane(), {.levels = 4});
+  check_octree(decoded);
+  std::size_t empty = 0;
+  for (const DecodedLevel& level : decoded.levels)
+    for (const DecodedFragment& fragment : level.fragments) empty += fragment.triangles.empty();
+  EXPECT_GT(empty, 0U) << "this mesh needs no empty fragment";
 }
 
 TEST_F(Neuroglancer, TheFinestLevelHasEveryVertex) {
@@ -199,6 +232,9 @@ TEST_F(Neuroglancer, ReplacesNothingButItsOwnKind) {
   mesh.save(path(), {.force = true});
   mesh.save(path(), {.sharded = true, .force = true});
   EXPECT_FALSE(fs::exists(path() / "1"));
+  EXPECT_NE(
+      read_text(path() / "info").find("\"sharding\":{\"@type\":\"neuroglancer_uint64_sharded_v1\""),
+      std::string::npos);
   std::ofstream(path() / "segment_properties" / "notes.txt") << "mine";
   EXPECT_THROW(mesh.save(path(), {.force = true}), UsageError);
   EXPECT_EQ(read_text(path() / "segment_properties" / "notes.txt"), "mine");
