@@ -51,6 +51,8 @@ std::vector<Sinks> open_sinks(const std::vector<ExtractedSurface>& surfaces,
                               const ExtractArguments& arguments, const AttributeVolumes& attributes,
                               Progress& progress) {
   const bool force = arguments.force;
+  // Several may be finished at the same time.
+  const bool is_only = surfaces.size() * arguments.outputs() == 1;
   std::vector<fs::path> inputs = paths_of(arguments.attributes);
   inputs.emplace_back(arguments.input.path);
   std::vector<Sinks> sinks;
@@ -66,7 +68,8 @@ std::vector<Sinks> open_sinks(const std::vector<ExtractedSurface>& surfaces,
                                             .sharded = surface.form.sharded,
                                             .force = force,
                                             .threads = arguments.threads,
-                                            .memory = memory_of_mesh(surface, surfaces.size())});
+                                            .memory = memory_of_mesh(surface, surfaces.size()),
+                                            .progress = is_only ? &progress : nullptr});
     if (of_surface.mesh && !attributes.empty())
       of_surface.attributes =
           std::make_unique<AttributeSink>(*of_surface.mesh, attributes.attributes(),
@@ -74,8 +77,7 @@ std::vector<Sinks> open_sinks(const std::vector<ExtractedSurface>& surfaces,
     if (!surface.preview.empty())
       of_surface.preview = open_preview(surface.preview.string(), force, arguments.preview);
     MeshFilterOptions filter = surface.filter;
-    // Several may be finished at the same time.
-    if (surfaces.size() * arguments.outputs() == 1) filter.progress = &progress;
+    if (is_only) filter.progress = &progress;
     of_surface.mesh_filter = filter_before(of_surface.mesh_file(), filter, surface.output);
     filter.measure = filter.measure && !of_surface.mesh;  // once is enough
     filter.unit.clear();                                  // cameras know the volume's
@@ -138,6 +140,8 @@ SurfaceReports make(const std::vector<ExtractedSurface>& surfaces, const std::ve
       filtered.measure = filter->measure();
       filtered.simplify_goal = filter->simplify_goal();
     }
+    if (const auto* levels = dynamic_cast<const LevelSink*>(sinks[i].mesh.get()))
+      filtered.levels = levels->levels();
     made.reports.push_back(report);
     made.filtered.push_back(filtered);
   }

@@ -71,6 +71,14 @@ std::string estimate_text(const ExtractedSurface& surface, const ExtractEstimate
       human_count(e.active.bricks), human_bytes(e.memory));
 }
 
+ordered_json levels_json(const std::vector<WrittenLevel>& levels) {
+  ordered_json list = ordered_json::array();
+  for (const WrittenLevel& level : levels)
+    list.push_back(
+        {{"triangles", level.triangles}, {"fragments", level.fragments}, {"bytes", level.bytes}});
+  return list;
+}
+
 ordered_json report_json(const ExtractedSurface& surface, const ExtractReport& r,
                          const FilteredSurface& filtered, std::uint64_t bytes) {
   ordered_json object{
@@ -100,6 +108,7 @@ ordered_json report_json(const ExtractedSurface& surface, const ExtractReport& r
                            {"vertices", filtered.extracted.vertices}};
   if (filtered.simplify_goal) object["simplify_goal"] = *filtered.simplify_goal;
   if (filtered.measure) object["measure"] = measure_json(*filtered.measure);
+  if (!filtered.levels.empty()) object["levels"] = levels_json(filtered.levels);
   if (!surface.attributes.empty()) object["attributes"] = surface.attributes;
   if (!surface.output.empty()) object["output"] = surface.output.string();
   if (!surface.preview.empty()) object["preview"] = surface.preview.string();
@@ -123,6 +132,9 @@ std::string report_text(const ExtractedSurface& surface, const ExtractReport& r,
   if (filtered.extracted.triangles > r.triangles)
     text += fmt::format("  of {} triangles\n", human_count(filtered.extracted.triangles));
   if (filtered.measure) text += measure_text(*filtered.measure);
+  if (filtered.levels.size() > 1)
+    text += fmt::format("  {} levels of detail, the coarsest of {} triangles\n",
+                        filtered.levels.size(), human_count(filtered.levels.back().triangles));
   if (!surface.output.empty())
     text += fmt::format("  {} ({})\n", surface.output.string(), human_bytes(bytes));
   if (!surface.preview.empty()) text += fmt::format("  {}\n", surface.preview.string());

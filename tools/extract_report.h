@@ -12,6 +12,7 @@
 #include <isobrick/estimate.h>
 #include <isobrick/extract.h>
 #include <isobrick/mesh_filters.h>
+#include "io/meshes/levels/level_sink.h"
 #include "tools/mesh_output.h"
 
 // What `isobrick extract` reports of each surface.
@@ -33,11 +34,14 @@ struct FilteredSurface {
   MeshSize extracted;                          ///< before the filters that change the mesh
   std::optional<MeshMeasure> measure;          ///< where that was requested
   std::optional<std::uint64_t> simplify_goal;  ///< in triangles, where there is one
+  std::vector<WrittenLevel> levels;            ///< of detail, of formats that have them
 };
 
 /// What is expected of a surface, for --json and for people.
 nlohmann::ordered_json estimate_json(const ExtractedSurface& surface, const ExtractEstimate& e);
 std::string estimate_text(const ExtractedSurface& surface, const ExtractEstimate& e);
+
+nlohmann::ordered_json levels_json(const std::vector<WrittenLevel>& levels);
 
 /// What was made; its file has `bytes`.
 nlohmann::ordered_json report_json(const ExtractedSurface& surface, const ExtractReport& r,

@@ -48,6 +48,9 @@ struct MeshFileOptions {
   /// Bytes of the whole operation's budget, of which the sink takes a small part
   /// (MeshSink::memory).
   std::uint64_t memory = std::uint64_t{1} << 30;
+  /// Of formats with levels of detail: hears of what takes long in finish(), within the stage of
+  /// the extraction. As MeshFilterOptions::progress.
+  Progress* progress = nullptr;
 };
 
 /// Opens a mesh file for extract(). It has its name once it is finished; a sink that is destroyed

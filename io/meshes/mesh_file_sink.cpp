@@ -105,7 +105,8 @@ std::unique_ptr<MeshSink> create_mesh_file(const std::filesystem::path& path,
       return create_neuroglancer_mesh(path, force, options.sharded,
                                       {.levels = options.levels,
                                        .threads = options.threads,
-                                       .memory = level_share(options.memory)});
+                                       .memory = level_share(options.memory),
+                                       .progress = options.progress});
   }
   throw UsageError("no such format of a mesh");
 }

@@ -58,6 +58,11 @@ TEST_F(MeshLevels, AreAFolderOfTheMesh) {
   EXPECT_EQ(made["triangles"], ply["triangles"]);
   EXPECT_EQ(made["vertices"], ply["vertices"]);
   EXPECT_EQ(made["output_bytes"], size_of("m.neuroglancer"));
+  ASSERT_EQ(made["levels"].size(), 1U);
+  EXPECT_EQ(made["levels"][0]["triangles"], made["triangles"]);
+  EXPECT_EQ(made["levels"][0]["fragments"], 1);
+  EXPECT_EQ(made["levels"][0]["bytes"], fs::file_size(path("m.neuroglancer/1")));
+  EXPECT_FALSE(ply.contains("levels"));
   for (const char* name : {"info", "1", "1.index", "segment_properties/info"})
     EXPECT_TRUE(fs::is_regular_file(path("m.neuroglancer") + "/" + name)) << name;
   EXPECT_EQ(files(), (std::vector<std::string>{"a.zarr", "m.neuroglancer", "m.ply"}));
@@ -84,6 +89,7 @@ TEST_F(MeshLevels, AFolderOfEachIsovalue) {
   ASSERT_EQ(
       run(extract({"-o", path("one"), "--format", "neuroglancer", "--levels", "2"})).exit_code, 0);
   EXPECT_EQ(read_file(path("m_127.5.neuroglancer/1")), read_file(path("one/1")));
+  EXPECT_NE(made.out.find("2 levels of detail"), std::string::npos) << made.out;
   EXPECT_TRUE(fs::exists(path("m_100.neuroglancer/info")));
 }
 

@@ -39,8 +39,8 @@ std::unique_ptr<draco::Mesh> draco_mesh(const FragmentMesh& mesh) {
   result->SetNumFaces(mesh.triangles.size());
   for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
     draco::Mesh::Face face;
-    for (int corner = 0; corner < 3; ++corner)
-      face[corner] = draco::PointIndex(mesh.triangles[i][static_cast<std::size_t>(corner)]);
+    for (std::size_t corner = 0; corner < 3; ++corner)
+      face[corner] = draco::PointIndex(mesh.triangles[i][corner]);
     result->SetFace(draco::FaceIndex(static_cast<std::uint32_t>(i)), face);
   }
   return result;

@@ -9,6 +9,7 @@
 #include <string>
 
 #include <isobrick/error.h>
+#include "core/cancel.h"
 #include "io/meshes/levels/draco_mesh.h"
 #include "io/meshes/levels/lattice_cut.h"
 
@@ -90,13 +91,18 @@ LatticeTriangle LevelFragments::on_lattice(const Triangle& triangle) {
   return t;
 }
 
+void LevelFragments::advance(std::uint64_t triangles) const {
+  if (cancel_requested()) throw Cancelled("the operation was cancelled");
+  work_.progress->advance(triangles * sizeof(Triangle));
+}
+
 template <class F>
 void LevelFragments::for_each_touched(F&& f) {
   const LatticeCut cut(grid_, level_);
   GridCell last{};
   Run* run_of_last = nullptr;  // mostly it is the next one's, too
   mesh_.triangles().for_each_run([&](std::span<const Triangle> triangles, std::uint64_t) {
-    work_.check_cancelled();
+    advance(triangles.size());
     for (const Triangle& t : triangles)
       cut.for_each_fragment(on_lattice(t), [&](const GridCell& cell) {
         if (!run_of_last || cell != last) run_of_last = &runs_[z_order_key(cell)];
@@ -144,7 +150,6 @@ std::vector<EncodedFragment> LevelFragments::encode(
   std::vector<EncodedFragment> encoded;
   std::vector<Fragment> batch;
   for (auto at = runs_.cbegin(); at != runs_.cend();) {
-    work_.check_cancelled();
     batch.clear();
     std::uint64_t triangles = 0;
     do {
@@ -155,6 +160,7 @@ std::vector<EncodedFragment> LevelFragments::encode(
       tbb::parallel_for(std::size_t{0}, batch.size(),
                         [&](std::size_t i) { encoders.local().encode(batch[i], grid_, level_); });
     });
+    advance(triangles);
     for (const Fragment& fragment : batch) {
       if (fragment.encoded.empty()) continue;
       if (fragment.encoded.size() > std::numeric_limits<std::uint32_t>::max())

@@ -6,6 +6,7 @@
 #include <string_view>
 #include <vector>
 
+#include <isobrick/progress.h>
 #include "filters/mesh_spool.h"
 #include "filters/scratch_array.h"
 #include "io/meshes/levels/chunk_lattice.h"
@@ -31,8 +32,8 @@ struct FragmentWork {
   ScratchPlace place;
   std::uint64_t memory = 0;  ///< of the triangles that are sorted, in bytes
   std::uint64_t triangles_at_once = 0;
-  int threads = 0;  ///< 0: all cores
-  std::function<void()> check_cancelled = [] {};
+  int threads = 0;               ///< 0: all cores
+  Progress* progress = nullptr;  ///< never null; bytes of each triangle three times
 };
 
 /// The triangles of a level's mesh, sorted by the fragments that they touch.
@@ -57,6 +58,8 @@ class LevelFragments {
     std::uint64_t size() const { return end - begin; }
   };
 
+  /// Reports triangles. Throws Cancelled when an end was requested.
+  void advance(std::uint64_t triangles) const;
   /// Calls f(triangle, run) for each triangle and each fragment that it touches.
   template <class F>
   void for_each_touched(F&& f);

@@ -42,7 +42,7 @@ std::string colour_text(const std::optional<std::array<std::uint8_t, 4>>& colour
 }  // namespace
 
 /// A segment on its way to its files.
-class NeuroglancerFolder::Segment final : public MeshSink {
+class NeuroglancerFolder::Segment final : public LevelSink {
  public:
   Segment(NeuroglancerFolder& folder, std::uint64_t id, const LevelOptions& options)
       : folder_(folder),
@@ -62,6 +62,7 @@ class NeuroglancerFolder::Segment final : public MeshSink {
   void finish() override { levels_.finish(); }
   std::uint64_t bytes() const override { return levels_.bytes() + manifest_bytes_; }
   std::uint64_t memory() const override { return levels_.memory(); }
+  std::vector<WrittenLevel> levels() const override { return levels_.levels(); }
 
  private:
   std::string path(std::string_view extension) const {
@@ -90,8 +91,9 @@ NeuroglancerFolder::NeuroglancerFolder(fs::path folder, bool sharded)
       sharded_(sharded),
       collected_(open_scratch_beside((folder_ / kInfo).string())) {}
 
-std::unique_ptr<MeshSink> NeuroglancerFolder::segment(std::uint64_t id, const LevelOptions& options,
-                                                      const SegmentProperties& properties) {
+std::unique_ptr<LevelSink> NeuroglancerFolder::segment(std::uint64_t id,
+                                                       const LevelOptions& options,
+                                                       const SegmentProperties& properties) {
   {
     const std::lock_guard lock(mutex_);
     properties_[id] = properties;
@@ -190,7 +192,7 @@ bool NeuroglancerFolder::is_own_name(std::string_view name) {
 namespace {
 
 /// A folder with one segment.
-class NeuroglancerMesh final : public MeshSink {
+class NeuroglancerMesh final : public LevelSink {
  public:
   NeuroglancerMesh(const fs::path& path, bool force, bool sharded, const LevelOptions& options)
       : output_((check_draco(), path), force, NeuroglancerFolder::is_own_name),
@@ -211,11 +213,12 @@ class NeuroglancerMesh final : public MeshSink {
     return is_finished_ ? folder_.bytes() : segment_->bytes();
   }
   std::uint64_t memory() const override { return segment_->memory(); }
+  std::vector<WrittenLevel> levels() const override { return segment_->levels(); }
 
  private:
   FolderOutput output_;
   NeuroglancerFolder folder_;
-  std::unique_ptr<MeshSink> segment_;
+  std::unique_ptr<LevelSink> segment_;
   bool is_finished_ = false;
 };
 

@@ -32,8 +32,8 @@ class NeuroglancerFolder {
   NeuroglancerFolder(std::filesystem::path folder, bool sharded);
 
   /// A sink for the mesh of a segment, which has its place when it is finished.
-  std::unique_ptr<MeshSink> segment(std::uint64_t id, const LevelOptions& options,
-                                    const SegmentProperties& properties);
+  std::unique_ptr<LevelSink> segment(std::uint64_t id, const LevelOptions& options,
+                                     const SegmentProperties& properties);
   /// Writes what describes the segments. Nothing follows.
   void finish();
   /// Bytes written so far, to scratch files as well; those of the output when it is finished.

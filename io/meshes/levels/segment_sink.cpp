@@ -5,6 +5,8 @@
 #include <limits>
 #include <utility>
 
+#include <fmt/format.h>
+
 #include <isobrick/mesh_filters.h>
 #include "io/meshes/levels/draco_mesh.h"
 
@@ -70,10 +72,7 @@ SegmentSink::SegmentSink(FileWriter& fragments, const LevelOptions& options, Fin
 
 MeshSpool SegmentSink::make_spool() const { return MeshSpool(place_, options_.memory / 4); }
 
-void SegmentSink::begin(const MeshHeader& header) {
-  unit_ = header.unit;
-  mesh_.begin({});
-}
+void SegmentSink::begin(const MeshHeader&) { mesh_.begin({}); }
 
 void SegmentSink::write(const MeshChunk& chunk) {
   MeshChunk plain = chunk;
@@ -109,16 +108,21 @@ void SegmentSink::choose_grid(const Extent& extent) {
   for (int i = 0;; ++i, edge /= 2) {
     grid_ = make_chunk_grid(extent.bounds, edge);
     if (i == most_divisions) return;
-    const FragmentWork work{.place = place_, .memory = options_.memory / 8};
+    const FragmentWork work{
+        .place = place_, .memory = options_.memory / 8, .progress = &no_progress()};
     if (LevelFragments(mesh_, grid_, 0, work).largest() <= kMaxFragmentTriangles) return;
   }
 }
 
 void SegmentSink::write_level(MeshSpool& mesh, int level, double scale) {
+  Progress& progress = options_.progress ? *options_.progress : no_progress();
   const FragmentWork work{.place = place_,
                           .memory = options_.memory / 4,
                           .triangles_at_once = kWorkBytes / kTriangleBytes,
-                          .threads = options_.threads};
+                          .threads = options_.threads,
+                          .progress = &progress};
+  progress.begin(fmt::format("level of detail {}", level),
+                 3 * mesh.triangles().size() * sizeof(Triangle));
   const std::uint64_t before = fragments_.size();
   LevelFragments fragments(mesh, grid_, level, work);
   ManifestLevel& entry = manifest_.emplace_back();
@@ -126,7 +130,8 @@ void SegmentSink::write_level(MeshSpool& mesh, int level, double scale) {
   // 0 would stand for a level that is not there.
   entry.scale = scale > 0 ? static_cast<float>(scale) : grid_.edge;
   if (level > 0) entry.scale = std::max(entry.scale, manifest_[manifest_.size() - 2].scale);
-  written_.push_back({mesh.size(), entry.fragments.size(), fragments_.size() - before});
+  written_.push_back({mesh.size().triangles, entry.fragments.size(), fragments_.size() - before});
+  progress.end();
 }
 
 bool SegmentSink::simplify() {
@@ -136,7 +141,8 @@ bool SegmentSink::simplify() {
   MeshFilter filter(sink, {.simplify_ratio = kLevelRatio,
                            .threads = options_.threads,
                            .memory = options_.memory / 4,
-                           .scratch_beside = options_.scratch_beside});
+                           .scratch_beside = options_.scratch_beside,
+                           .progress = options_.progress});
   filter.begin({});
   mesh_.replay_and_release(filter);
   filter.finish();

@@ -3,13 +3,14 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
-#include <stop_token>
 #include <string>
 #include <vector>
 
 #include <isobrick/mesh.h>
+#include <isobrick/progress.h>
 #include "filters/mesh_spool.h"
 #include "io/bytes/output_file.h"
+#include "io/meshes/levels/level_sink.h"
 #include "io/meshes/levels/manifest.h"
 
 namespace isobrick::inline v0 {
@@ -20,13 +21,8 @@ struct LevelOptions {
   int threads = 0;  ///< 0: all cores; never shows in the bytes
   std::uint64_t memory = std::uint64_t{16} << 20;  ///< level_memory() takes more
   std::filesystem::path scratch_beside = "-";
-};
-
-/// A level that was written.
-struct WrittenLevel {
-  MeshSize size;
-  std::uint64_t fragments = 0;  ///< with triangles
-  std::uint64_t bytes = 0;
+  /// Hears of levels, within another stage. It must outlive the sink. Null: nobody.
+  Progress* progress = nullptr;
 };
 
 /// What writing a mesh with levels holds at most, LevelOptions::memory included.
@@ -39,7 +35,7 @@ std::uint64_t level_share(std::uint64_t budget);
 /// kept. Levels end early where a further one would not be clearly smaller.
 ///
 /// What it writes depends on the mesh and the number of levels alone.
-class SegmentSink final : public MeshSink {
+class SegmentSink final : public LevelSink {
  public:
   /// Takes the manifest when all fragments are written.
   using Finish = std::function<void(const std::string& manifest)>;
@@ -54,10 +50,7 @@ class SegmentSink final : public MeshSink {
   std::uint64_t bytes() const override;
   std::uint64_t memory() const override { return level_memory(options_); }
 
-  /// After begin(): the unit of the mesh.
-  const std::string& unit() const { return unit_; }
-  /// After finish().
-  const std::vector<WrittenLevel>& levels() const { return written_; }
+  std::vector<WrittenLevel> levels() const override { return written_; }
 
  private:
   /// What a mesh measures, as far as its grid depends on it.
@@ -79,7 +72,6 @@ class SegmentSink final : public MeshSink {
   ScratchPlace place_;
   MeshSpool mesh_;
   ChunkGrid grid_;
-  std::string unit_;
   std::vector<ManifestLevel> manifest_;
   std::vector<WrittenLevel> written_;
 };
