@@ -24,8 +24,8 @@ class BrickReader {
   bool read(Int3 brick, std::byte* out) const;
   /// Whether bricks can be read without being decoded.
   bool is_packed() const { return store_.is_packed(level_); }
-  /// As StoreReader::read_packed. Samples are compared with ranges by whoever decodes them:
-  /// stored_range() has those of the brick.
+  /// As StoreReader::read_packed. What decodes the brick must compare its samples
+  /// with stored_range().
   std::optional<std::size_t> read_packed(Int3 brick, std::span<std::byte> out) const;
   /// Everything where the store has no ranges.
   ValueRange<double> stored_range(Int3 brick) const;

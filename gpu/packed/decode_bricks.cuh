@@ -56,7 +56,7 @@ __device__ int count_bits(Unsigned<kBytes> bits) {
     return __popc(bits);
 }
 
-/// The sum over all lanes below.
+/// The sum over the lanes of a warp before this one.
 __device__ inline std::uint32_t sum_below(int lane, std::uint32_t value) {
   std::uint32_t sum = value;
 #pragma unroll

@@ -36,14 +36,14 @@ void PackedUploads::set(std::size_t buffer, std::span<const std::byte> packed, I
 void PackedUploads::decode(std::span<const UploadTracker::PendingBrick> bricks,
                            const Stream& copies) {
   const NvtxRange range("decode packed bricks");
-  Lane& lane = lanes_[calls_++ % kLanes];
-  lane.copied.record(copies);
-  check(cudaStreamWaitEvent(lane.stream.get(), lane.copied.get()));
+  DecodeStream& own = streams_[calls_++ % kStreams];
+  own.copied.record(copies);
+  check(cudaStreamWaitEvent(own.stream.get(), own.copied.get()));
   for (std::size_t i = 0; i < bricks.size(); i += DecodeParams::kMax)
     launch(bricks.subspan(i, std::min<std::size_t>(DecodeParams::kMax, bricks.size() - i)),
-           lane.stream);
-  lane.decoded.record(lane.stream);
-  check(cudaStreamWaitEvent(order_.get(), lane.decoded.get()));
+           own.stream);
+  own.decoded.record(own.stream);
+  check(cudaStreamWaitEvent(order_.get(), own.decoded.get()));
   check(cudaMemcpyAsync(failed_here_.data(), failed_.data(), failed_.bytes(),
                         cudaMemcpyDeviceToHost, order_.get()));
 }

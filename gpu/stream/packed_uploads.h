@@ -48,9 +48,9 @@ class PackedUploads {
     ValueRange<double> range;
   };
 
-  static constexpr std::size_t kLanes = 4;
-  /// Calls that are worked on one after the other.
-  struct Lane {
+  static constexpr std::size_t kStreams = 4;
+  /// What calls are worked on in, in turn.
+  struct DecodeStream {
     Stream stream;
     Event copied{cudaEventDisableTiming}, decoded{cudaEventDisableTiming};
   };
@@ -59,7 +59,7 @@ class PackedUploads {
 
   Lattice lattice_;
   std::size_t buffer_bytes_;
-  std::array<Lane, kLanes> lanes_;
+  std::array<DecodeStream, kStreams> streams_;
   std::uint64_t calls_ = 0;
   Stream order_;
   std::vector<Load> loads_;  ///< of each buffer

@@ -64,6 +64,8 @@ class Mesh:
         *,
         force: bool = False,
         quantize: bool = False,
+        levels: Optional[int] = None,
+        sharded: bool = False,
         progress: _Progress = None,
     ) -> None: ...
     def filtered(

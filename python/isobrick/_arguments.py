@@ -277,8 +277,12 @@ def filter_options(
     return options
 
 
-def mesh_file_options(*, force=False, quantize=False, threads=0, memory=2**30):
+def mesh_file_options(
+    *, force=False, quantize=False, threads=0, memory=2**30, levels=None, sharded=False,
+):
     options = _isobrick.MeshFileOptions()
+    options.levels = 0 if levels is None else integer(levels, "levels", 1, 2**31 - 1)
+    options.sharded = bool(sharded)
     options.force = bool(force)
     options.quantize = bool(quantize)
     options.threads = thread_count(threads)

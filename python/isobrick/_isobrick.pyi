@@ -72,6 +72,8 @@ class MeshFilterOptions:
 
 class MeshFileOptions:
     quantize: bool
+    levels: int
+    sharded: bool
     force: bool
     threads: int
     memory: int

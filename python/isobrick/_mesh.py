@@ -114,7 +114,9 @@ class Mesh:
             parts.append(f"in {self.unit}s")
         return f"<isobrick.Mesh: {', '.join(parts)}>"
 
-    def save(self, path, *, force=False, quantize=False, progress=None):
+    def save(
+        self, path, *, force=False, quantize=False, levels=None, sharded=False, progress=None,
+    ):
         """Writes a mesh file.
 
         Parameters
@@ -126,13 +128,20 @@ class Mesh:
             Replaces a file that exists; otherwise that is a UsageError.
         quantize : bool
             GLB only: 16 bits a coordinate.
+        levels : int, optional
+            neuroglancer only: levels of detail at most; by default until one part has the whole
+            mesh.
+        sharded : bool
+            neuroglancer only: few large files.
         progress : function or tqdm, optional
             A function of (stage, done, total) in bytes, a tqdm bar, or the class `tqdm`.
 
         The file has its name once it is whole. Raises a FileError, which is an OSError, where the
         system refuses it.
         """
-        options = mesh_file_options(force=force, quantize=quantize)
+        options = mesh_file_options(
+            force=force, quantize=quantize, levels=levels, sharded=sharded
+        )
         with reporting(progress) as report:
             self._native.save(path_text(path), options, report)
 

@@ -3,6 +3,7 @@
 import copy
 import errno
 import gc
+import json
 import pickle
 import signal
 import threading
@@ -98,6 +99,24 @@ def test_ctrl_c_ends_a_save_and_leaves_no_file(tmp_path, extension):
         time.sleep(2)
     assert time.monotonic() - begun < 1.5
     assert list(tmp_path.iterdir()) == []
+
+
+def test_levels_of_detail(tmp_path):
+    mesh = isobrick.extract(ball(), 1)
+    try:
+        mesh.save(tmp_path / "a.neuroglancer", levels=2, sharded=True)
+    except isobrick.UsageError as error:
+        pytest.skip(str(error))  # without Draco
+    info = json.loads((tmp_path / "a.neuroglancer" / "info").read_text())
+    assert info["@type"] == "neuroglancer_multilod_draco" and "sharding" in info
+    mesh.save(tmp_path / "b.neuroglancer")
+    assert "sharding" not in json.loads((tmp_path / "b.neuroglancer" / "info").read_text())
+    for wrong in ({"levels": 0}, {"levels": 17}, {"levels": "two"}):
+        with pytest.raises((isobrick.UsageError, TypeError)):
+            mesh.save(tmp_path / "c.neuroglancer", **wrong)
+    with pytest.raises(isobrick.UsageError):
+        mesh.save(tmp_path / "c.ply", levels=2)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.neuroglancer", "b.neuroglancer"]
 
 
 def test_progress_of_a_save(tmp_path):
