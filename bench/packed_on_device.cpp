@@ -42,7 +42,7 @@ double decode_on_device(ScalarType type, Int3 extent,
     gpu::DecodeParams& p = launches.back();
     const isobrick::packed::BrickLayout layout(type, extent, brick);
     p.bricks[p.count++] = {reinterpret_cast<const std::uint8_t*>(at), to.data() + i * brick_bytes,
-                           static_cast<std::uint32_t>(layout.entries()), i};
+                           static_cast<std::uint32_t>(layout.entries()), layout.is_plain(), i};
     at += room_of(brick.size());
   }
   std::vector<double> seconds;

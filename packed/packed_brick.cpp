@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cstring>
+#include <optional>
+#include <utility>
 
 #include <isobrick/error.h>
 #include <isobrick/pod_buffer.h>
@@ -15,6 +17,9 @@ namespace {
 
 using packed::kBlock;
 using packed::kEdge;
+
+/// Blocks hold at most so many times the samples of a brick.
+constexpr Index kMostRepeated = 4;
 
 /// Calls f(number, first sample) of each block of a brick, x fastest.
 template <class F>
@@ -41,25 +46,40 @@ void gather(Int3 extent, const std::byte* samples, std::size_t bytes, Int3 first
     }
 }
 
-std::vector<std::byte> pack_as(packed::BlockKind kind, Int3 extent, const std::byte* samples,
-                               std::span<const std::byte> palette, std::size_t entries) {
-  const std::size_t table = packed::table_bytes(extent);
-  thread_local PodBuffer<std::byte> buffer;
-  buffer.resize(palette.size() + packed::max_packed_bytes(extent, kind.code_bytes));
-  const packed::BrickHeader header{.code_bytes = static_cast<std::uint8_t>(kind.code_bytes),
-                                   .palette = static_cast<std::uint16_t>(entries)};
-  std::memcpy(buffer.data(), &header, sizeof header);
-  std::copy(palette.begin(), palette.end(), buffer.data() + table);
-  std::byte* const blocks = buffer.data() + table + palette.size();
-  std::size_t size = 0;
+/// Nothing where that would not be shorter than `most` bytes.
+std::optional<std::vector<std::byte>> pack_as(packed::BlockKind kind, Int3 extent,
+                                              const std::byte* samples,
+                                              const packed::Palette* palette, std::size_t most) {
+  std::vector<std::byte> result(packed::table_bytes(extent));
+  const packed::BrickHeader header{
+      .code_bytes = static_cast<std::uint8_t>(kind.code_bytes),
+      .palette = static_cast<std::uint16_t>(palette ? palette->entries : 0)};
+  std::memcpy(result.data(), &header, sizeof header);
+  if (palette) result.insert(result.end(), palette->values.begin(), palette->values.end());
+  const std::size_t first = result.size();
   alignas(64) std::byte block[kBlock * sizeof(std::uint64_t)];
-  for_each_block(extent, [&](std::size_t number, Int3 first) {
-    gather(extent, samples, kind.code_bytes, first, block);
-    size += packed::pack_block(kind, block, reinterpret_cast<std::uint8_t*>(blocks + size));
-    const auto end = static_cast<std::uint32_t>(size);
-    std::memcpy(buffer.data() + sizeof header + number * sizeof end, &end, sizeof end);
+  std::byte bytes[packed::max_block_bytes(sizeof(std::uint64_t))];
+  for_each_block(extent, [&](std::size_t number, Int3 place) {
+    if (result.size() >= most) return;
+    gather(extent, samples, kind.code_bytes, place, block);
+    const std::size_t size =
+        packed::pack_block(kind, block, reinterpret_cast<std::uint8_t*>(bytes));
+    result.insert(result.end(), bytes, bytes + size);
+    const auto end = static_cast<std::uint32_t>(result.size() - first);
+    std::memcpy(result.data() + sizeof(packed::BrickHeader) + number * sizeof end, &end,
+                sizeof end);
   });
-  return {buffer.data(), blocks + size};
+  if (result.size() >= most) return std::nullopt;
+  result.shrink_to_fit();
+  return result;
+}
+
+std::vector<std::byte> pack_plain(std::span<const std::byte> samples) {
+  const packed::BrickHeader header;
+  std::vector<std::byte> result(sizeof header + samples.size());
+  std::memcpy(result.data(), &header, sizeof header);
+  std::copy(samples.begin(), samples.end(), result.begin() + sizeof header);
+  return result;
 }
 
 /// Unpacks the blocks of a brick; those that reach beyond it by way of a block of their own.
@@ -84,20 +104,30 @@ void unpack_blocks(const packed::BrickLayout& layout, packed::BlockKind kind, In
 
 std::vector<std::byte> pack_brick(ScalarType type, Int3 extent,
                                   std::span<const std::byte> samples) {
-  if (const auto palette = packed::find_palette(type, samples))
-    return pack_as({1, false}, extent, palette->numbers.data(), palette->values, palette->entries);
-  return pack_as({size_of(type), is_floating(type)}, extent, samples.data(), {}, 0);
+  const std::size_t most = packed::max_packed_bytes(extent, size_of(type));
+  // Blocks of thin bricks would hold little but repeated samples.
+  if (volume(packed::blocks_of(extent)) * kBlock > kMostRepeated * volume(extent))
+    return pack_plain(samples);
+  const auto palette = packed::find_palette(type, samples);
+  const packed::BlockKind kind =
+      palette ? packed::BlockKind{} : packed::BlockKind{size_of(type), is_floating(type)};
+  auto packed = pack_as(kind, extent, palette ? palette->numbers.data() : samples.data(),
+                        palette ? &*palette : nullptr, most);
+  return packed ? *std::move(packed) : pack_plain(samples);
 }
 
 std::size_t packed_brick_memory(std::size_t brick_bytes) {
-  // What pack_brick() writes to, and the numbers of a palette; blocks reach beyond bricks whose
-  // edges are no multiples of theirs.
-  return 4 * brick_bytes;
+  // What pack_brick() writes to, which grows, and the numbers of a palette.
+  return 3 * brick_bytes + packed::max_block_bytes(sizeof(std::uint64_t));
 }
 
 void unpack_brick(ScalarType type, Int3 extent, std::span<const std::byte> packed,
                   std::span<std::byte> samples) {
   const packed::BrickLayout layout(type, extent, packed);
+  if (layout.is_plain()) {
+    std::copy(layout.plain().begin(), layout.plain().end(), samples.begin());
+    return;
+  }
   if (layout.entries() == 0)
     return unpack_blocks(layout, {size_of(type), is_floating(type)}, extent, samples.data());
   thread_local PodBuffer<std::byte> numbers;

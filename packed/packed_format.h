@@ -28,7 +28,7 @@ enum Axes : std::uint8_t { along_x = 1, along_y = 2, along_z = 4, all_axes = 7 }
 /// How a brick begins; `ends` of its blocks, a palette and the blocks follow.
 struct BrickHeader {
   std::uint8_t version = kVersion;
-  std::uint8_t code_bytes = 0;  ///< 1, 2, 4 or 8; 1 with a palette
+  std::uint8_t code_bytes = 0;  ///< 1, 2, 4 or 8; 1 with a palette; 0: plain samples follow
   std::uint16_t palette = 0;    ///< entries; 0: none
 };
 static_assert(sizeof(BrickHeader) == 4);
@@ -47,10 +47,9 @@ constexpr std::size_t max_block_bytes(std::size_t code_bytes) {
   return code_bytes + 1 + sizeof(std::uint32_t) + (kBlock + 2 * kGroups) * code_bytes;
 }
 
-/// The most bytes that a brick takes.
+/// The most bytes that a brick takes: those of plain samples.
 constexpr std::size_t max_packed_bytes(Int3 brick, std::size_t sample_bytes) {
-  return table_bytes(brick) +
-         static_cast<std::size_t>(volume(blocks_of(brick))) * max_block_bytes(sample_bytes);
+  return sizeof(BrickHeader) + static_cast<std::size_t>(volume(brick)) * sample_bytes;
 }
 
 }  // namespace isobrick::inline v0::packed

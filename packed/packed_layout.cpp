@@ -19,11 +19,21 @@ BrickLayout::BrickLayout(ScalarType type, Int3 extent, std::span<const std::byte
     : ends_(packed.data() + sizeof(BrickHeader)) {
   const std::size_t table = table_bytes(extent), sample_bytes = size_of(type);
   BrickHeader header;
-  if (packed.size() < table) throw DamageError("too short for a packed brick");
+  if (packed.size() < sizeof header) throw DamageError("too short for a packed brick");
   std::memcpy(&header, packed.data(), sizeof header);
   if (header.version != kVersion)
     throw DamageError("packed by version " + std::to_string(header.version) +
                       ", this program knows version " + std::to_string(kVersion));
+  if (header.code_bytes == 0 && header.palette == 0) {
+    is_plain_ = true;
+    blocks_ = packed.subspan(sizeof header);
+    const std::size_t most = max_packed_bytes(extent, sample_bytes);
+    if (packed.size() != most)
+      throw DamageError("holds " + std::to_string(packed.size()) + " bytes, must hold " +
+                        std::to_string(most));
+    return;
+  }
+  if (packed.size() < table) throw DamageError("too short for a packed brick");
   const bool right_palette =
       header.palette <= kMaxPalette && (header.palette == 0 || sample_bytes > 1);
   if (!right_palette || header.code_bytes != (header.palette > 0 ? 1 : sample_bytes))

@@ -16,6 +16,9 @@ class BrickLayout {
   /// are not looked at. `packed` must outlive it.
   BrickLayout(ScalarType type, Int3 extent, std::span<const std::byte> packed);
 
+  /// Whether plain samples follow: then there are no blocks.
+  bool is_plain() const { return is_plain_; }
+  std::span<const std::byte> plain() const { return blocks_; }
   /// Values of the palette; 0: the brick has none.
   std::size_t entries() const { return entries_; }
   std::span<const std::byte> palette() const { return palette_; }
@@ -23,6 +26,7 @@ class BrickLayout {
   std::span<const std::uint8_t> block(std::size_t number) const;
 
  private:
+  bool is_plain_ = false;
   std::size_t entries_ = 0;
   const std::byte* ends_;
   std::span<const std::byte> palette_, blocks_;

@@ -75,6 +75,10 @@ export function decode(bytes, shape, dataType) {
   const blocks = shape.map((extent) => Math.ceil(extent / 16));
   const samples = new arrays[dataType](depth * height * width);
   const size = samples.BYTES_PER_ELEMENT;
+  if (bytes[1] === 0) {
+    new Uint8Array(samples.buffer).set(bytes.subarray(4));
+    return samples;
+  }
   const target = new DataView(samples.buffer);
   const table = 4 + 4 * blocks[0] * blocks[1] * blocks[2];
   const palette = bytes.subarray(table, table + entries * size);

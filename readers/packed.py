@@ -50,6 +50,8 @@ def decode(data, shape, dtype):
     entries = int(data[2:4].view("<u2")[0])
     if data[0] != 1:
         raise ValueError(f"packed by version {data[0]}, not 1")
+    if data[1] == 0:
+        return data[4:].view(dtype).reshape(shape)
     code = np.dtype(f"<u{data[1]}")
     nz, ny, nx = (-(-extent // 16) for extent in shape)
     at = 4 + 4 * nz * ny * nx

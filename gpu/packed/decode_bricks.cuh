@@ -360,6 +360,18 @@ __device__ void decode_blocks(DecodeShared<kBytes>& shared, const DecodeParams& 
   if (!good || store.damaged) atomicMin(p.failed, brick.number);
 }
 
+/// A part of plain samples, which lie behind the header.
+__device__ inline void copy_plain(const PackedOnDevice& brick, std::size_t bytes,
+                                  std::uint32_t part, std::uint32_t parts) {
+  const std::uint8_t* const from = brick.from + sizeof(packed::BrickHeader);
+  auto* const to = static_cast<std::uint8_t*>(brick.to);
+  const std::size_t words = bytes / 4, step = std::size_t{parts} * 32 * kDecodeWarps;
+  const std::size_t thread = std::size_t{part} * 32 * kDecodeWarps + threadIdx.x;
+  for (std::size_t i = thread; i < words; i += step)
+    reinterpret_cast<std::uint32_t*>(to)[i] = reinterpret_cast<const std::uint32_t*>(from)[i];
+  if (thread < bytes % 4) to[4 * words + thread] = from[4 * words + thread];
+}
+
 /// `parts` blocks of threads a brick.
 template <int kSampleBytes, bool kFloating>
 __global__ void __launch_bounds__(32 * kDecodeWarps)
@@ -368,6 +380,12 @@ __global__ void __launch_bounds__(32 * kDecodeWarps)
   const std::uint32_t begin = blockIdx.x % p.parts * kBlocksOfDecodeBlock +
                               (threadIdx.x >> 5) * static_cast<std::uint32_t>(kBlocksOfWarp);
   const auto count = static_cast<std::uint32_t>(p.blocks[0] * p.blocks[1] * p.blocks[2]);
+  if (brick.is_plain) {
+    const std::size_t size = std::size_t{kSampleBytes} * static_cast<std::size_t>(p.extent[0]) *
+                             static_cast<std::size_t>(p.extent[1]) *
+                             static_cast<std::size_t>(p.extent[2]);
+    return copy_plain(brick, size, blockIdx.x % p.parts, p.parts);
+  }
   auto* const samples = static_cast<Unsigned<kSampleBytes>*>(brick.to);
   const std::uint8_t* const values =
       brick.from + sizeof(packed::BrickHeader) + std::size_t{count} * 4;

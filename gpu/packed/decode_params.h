@@ -15,6 +15,7 @@ struct PackedOnDevice {
   const std::uint8_t* from;  ///< aligned to 4 bytes, and 8 bytes beyond its end can be read
   void* to;                  ///< samples of the whole brick, aligned to 32 bytes
   std::uint32_t palette;     ///< entries; 0: none
+  bool is_plain;             ///< plain samples follow the header
   unsigned long long number;
 };
 

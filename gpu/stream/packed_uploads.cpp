@@ -30,7 +30,8 @@ PackedUploads::~PackedUploads() { (void)cudaStreamSynchronize(order_.get()); }
 void PackedUploads::set(std::size_t buffer, std::span<const std::byte> packed, Int3 brick,
                         ValueRange<double> range) {
   const packed::BrickLayout layout(lattice_.type, lattice_.brick, packed);
-  loads_[buffer] = {packed.size(), static_cast<std::uint32_t>(layout.entries()), brick, range};
+  loads_[buffer] = {packed.size(), static_cast<std::uint32_t>(layout.entries()), layout.is_plain(),
+                    brick, range};
 }
 
 void PackedUploads::decode(std::span<const UploadTracker::PendingBrick> bricks,
@@ -60,7 +61,7 @@ void PackedUploads::launch(std::span<const UploadTracker::PendingBrick> bricks,
         static_cast<unsigned long long>(linear_index(load.brick, lattice_.bricks()));
     decode.bricks[decode.count++] = {
         reinterpret_cast<const std::uint8_t*>(on_device(pending.buffer)), pending.to, load.palette,
-        number};
+        load.is_plain, number};
     const Int3 inside = lattice_.brick_box(load.brick).extent();
     ranges.bricks[ranges.count++] = {
         pending.to,

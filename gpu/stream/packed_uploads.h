@@ -44,6 +44,7 @@ class PackedUploads {
   struct Load {
     std::size_t bytes = 0;
     std::uint32_t palette = 0;
+    bool is_plain = false;
     Int3 brick;
     ValueRange<double> range;
   };

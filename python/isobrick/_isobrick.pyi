@@ -95,15 +95,9 @@ class VolumeRequest:
     time: Optional[int]
     def set_roi(self, lo: list[Optional[int]], hi: list[Optional[int]]) -> None: ...
 
-class BrickCodec:
-    none: BrickCodec
-    zstd: BrickCodec
-    packed: BrickCodec
-
 class ConvertOptions:
     brick: Optional[int]
     shard: Optional[int]
-    codec: BrickCodec
     zstd_level: int
     levels: Optional[int]
     memory: int
@@ -112,6 +106,8 @@ class ConvertOptions:
     force: bool
     leaf: int
     ome_04: bool
+    def set_packed(self) -> None: ...
+    def set_uncompressed(self) -> None: ...
     def set_downsampling(self, name: str) -> bool: ...
     def set_index(self, name: str) -> bool: ...
 

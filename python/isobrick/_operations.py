@@ -21,9 +21,9 @@ def _convert_options(
     options.brick = None if brick is None else integer(brick, "brick", -(2**31), 2**31 - 1)
     options.shard = None if shard is None else integer(shard, "shard", -(2**31), 2**31 - 1)
     if compression is None:
-        options.codec = _isobrick.BrickCodec.none
+        options.set_uncompressed()
     elif compression == "packed":
-        options.codec = _isobrick.BrickCodec.packed
+        options.set_packed()
     else:
         options.zstd_level = integer(compression, "compression", -(2**31), 2**31 - 1)
     options.levels = None if levels is None else integer(levels, "levels", -(2**31), 2**31 - 1)

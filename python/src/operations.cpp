@@ -26,15 +26,12 @@ namespace isobrick::python {
 namespace {
 
 void bind_convert_options(py::module_& module) {
-  py::enum_<BrickCodec>(module, "BrickCodec")
-      .value("none", BrickCodec::none)
-      .value("zstd", BrickCodec::zstd)
-      .value("packed", BrickCodec::packed);
   py::class_<ConvertOptions>(module, "ConvertOptions")
       .def(py::init<>())
       .def_readwrite("brick", &ConvertOptions::brick)
       .def_readwrite("shard", &ConvertOptions::shard)
-      .def_readwrite("codec", &ConvertOptions::codec)
+      .def("set_packed", [](ConvertOptions& o) { o.codec = BrickCodec::packed; })
+      .def("set_uncompressed", [](ConvertOptions& o) { o.codec = BrickCodec::none; })
       .def_readwrite("zstd_level", &ConvertOptions::zstd_level)
       .def_readwrite("levels", &ConvertOptions::levels)
       .def_readwrite("memory", &ConvertOptions::memory)

@@ -89,6 +89,12 @@ TEST(PackedFormat, DensePlanes) {
   EXPECT_EQ(packed.substr(28, 8), "02000200");
 }
 
+TEST(PackedFormat, PlainSamples) {
+  EXPECT_EQ(packed_hex<std::uint16_t>({3, 1, 1}, {1, 2, 0x1234}),
+            "01000000"
+            "010002003412");
+}
+
 TEST(PackedFormat, Palette) {
   // Two values far apart: their numbers are packed as samples of one byte. The last sample is the
   // larger one, in group 31 the code 2: plane 1 with column 15 alone, and row 7 of it.

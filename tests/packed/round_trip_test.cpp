@@ -68,6 +68,15 @@ TEST(Packed, WhatRepeatsTakesFewBytes) {
   }
 }
 
+// What nothing makes shorter, and bricks that are thinner than blocks, are stored as they are.
+TEST(Packed, NoBrickTakesMuchMoreThanItsSamples) {
+  for (const ScalarType type : kScalarTypes)
+    for (const Int3 extent : {Int3{64, 64, 64}, Int3{5000, 1, 1}, Int3{70, 3, 60}, Int3{1, 1, 1}}) {
+      const auto samples = make_brick(type, extent, "noise");
+      EXPECT_LE(pack_brick(type, extent, samples).size(), samples.size() + 4) << extent.x;
+    }
+}
+
 // Numbers of few values are packed, where the values lie far apart.
 TEST(Packed, FewValuesTakeAPalette) {
   EXPECT_GT(ratio(ScalarType::u32, "labels"), 3 * ratio(ScalarType::u8, "labels"));

@@ -28,7 +28,7 @@ class Decoded {
     auto& samples = samples_.emplace_back(static_cast<std::size_t>(volume(extent_)));
     params_.bricks[params_.count] = {reinterpret_cast<const std::uint8_t*>(words.data()),
                                      samples.data(), static_cast<std::uint32_t>(layout.entries()),
-                                     100 + params_.count};
+                                     layout.is_plain(), 100 + params_.count};
     ++params_.count;
   }
   void run(unsigned seed) {
