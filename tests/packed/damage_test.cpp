@@ -1,9 +1,11 @@
 #include <gtest/gtest.h>
 
+#include <cstring>
 #include <random>
 
 #include <isobrick/error.h>
 #include "packed/packed_brick.h"
+#include "packed/packed_format.h"
 #include "tests/packed/fields.h"
 
 namespace isobrick::test {
@@ -80,6 +82,34 @@ INSTANTIATE_TEST_SUITE_P(Types, PackedDamage,
                            return std::string(zarr_name(std::get<0>(test.param))) + "_" +
                                   std::get<1>(test.param);
                          });
+
+// Nobody would miss them, but no encoder writes them.
+TEST(Packed, ABlockWithBytesTooManyIsRefused) {
+  const Int3 extent{16, 16, 16};
+  for (const char* field : {"noisy", "sparse"}) {
+    auto bytes = pack_brick(ScalarType::u8, extent, make_brick(ScalarType::u8, extent, field));
+    bytes.push_back({});
+    const auto end = static_cast<std::uint32_t>(bytes.size() - packed::table_bytes(extent));
+    std::memcpy(bytes.data() + sizeof(packed::BrickHeader), &end, sizeof end);
+    std::vector<std::byte> samples(4096);
+    EXPECT_THROW(unpack_brick(ScalarType::u8, extent, bytes, samples), DamageError) << field;
+  }
+}
+
+TEST(Packed, ANumberThatThePaletteLacksIsRefused) {
+  const Int3 extent{16, 16, 16};
+  auto bytes = pack_brick(ScalarType::u32, extent, make_brick(ScalarType::u32, extent, "labels"));
+  std::uint16_t entries = 0;
+  std::memcpy(&entries, bytes.data() + 2, sizeof entries);
+  ASSERT_EQ(entries, 3);
+  // One value less; the blocks begin where the palette ends.
+  const std::uint16_t fewer = 2;
+  std::memcpy(bytes.data() + 2, &fewer, sizeof fewer);
+  bytes.erase(bytes.begin() + static_cast<std::ptrdiff_t>(packed::table_bytes(extent)),
+              bytes.begin() + static_cast<std::ptrdiff_t>(packed::table_bytes(extent)) + 4);
+  std::vector<std::byte> samples(4 * 4096);
+  EXPECT_THROW(unpack_brick(ScalarType::u32, extent, bytes, samples), DamageError);
+}
 
 TEST(Packed, BricksOfAnotherTypeOrShapeAreRefused) {
   const auto bytes =
