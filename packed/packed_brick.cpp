@@ -31,6 +31,16 @@ void for_each_block(Int3 extent, const F& f) {
       for (Index x = 0; x < blocks.x; ++x) f(number++, Int3{x, y, z} * Index{kEdge});
 }
 
+/// Copies a row of a block. Whole rows are of few sizes, which no call is made for.
+void copy_row(std::byte* to, const std::byte* from, std::size_t size) {
+  switch (size) {
+    case 16: std::memcpy(to, from, 16); break;
+    case 32: std::memcpy(to, from, 32); break;
+    case 64: std::memcpy(to, from, 64); break;
+    default: std::memcpy(to, from, size);
+  }
+}
+
 /// A block of samples; where it reaches beyond the brick the last ones are repeated.
 void gather(Int3 extent, const std::byte* samples, std::size_t bytes, Int3 first, std::byte* to) {
   const auto inside = static_cast<std::size_t>(std::min<Index>(kEdge, extent.x - first.x));
@@ -40,7 +50,7 @@ void gather(Int3 extent, const std::byte* samples, std::size_t bytes, Int3 first
                      std::min(first.z + z, extent.z - 1)};
       const std::byte* const from =
           samples + static_cast<std::size_t>(linear_index(row, extent)) * bytes;
-      std::memcpy(to, from, inside * bytes);
+      copy_row(to, from, inside * bytes);
       for (std::size_t x = inside; x < kEdge; ++x)
         std::memcpy(to + x * bytes, from + (inside - 1) * bytes, bytes);
     }
