@@ -24,10 +24,11 @@ BrickLayout::BrickLayout(ScalarType type, Int3 extent, std::span<const std::byte
   if (header.version != kVersion)
     throw DamageError("packed by version " + std::to_string(header.version) +
                       ", this program knows version " + std::to_string(kVersion));
+  const std::size_t most = max_packed_bytes(extent, sample_bytes);
+  if (packed.size() > most) throw DamageError("longer than plain samples");
   if (header.code_bytes == 0 && header.palette == 0) {
     is_plain_ = true;
     blocks_ = packed.subspan(sizeof header);
-    const std::size_t most = max_packed_bytes(extent, sample_bytes);
     if (packed.size() != most)
       throw DamageError("holds " + std::to_string(packed.size()) + " bytes, must hold " +
                         std::to_string(most));

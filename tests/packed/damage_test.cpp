@@ -96,6 +96,22 @@ TEST(Packed, ABlockWithBytesTooManyIsRefused) {
   }
 }
 
+// Whoever reads packed bricks has room for plain samples, not for more.
+TEST(Packed, ABrickLongerThanPlainSamplesIsRefused) {
+  const Int3 extent{16, 16, 16};
+  // All groups with eight dense planes: a block as it should be, but for its length.
+  const std::uint32_t all = ~0u, end = 1 + 1 + 4 + 32 * 2 + 4096;
+  std::vector<std::byte> bytes(packed::table_bytes(extent) + end);
+  const packed::BrickHeader header{.code_bytes = 1};
+  std::memcpy(bytes.data(), &header, sizeof header);
+  std::memcpy(bytes.data() + sizeof header, &end, sizeof end);
+  std::memcpy(bytes.data() + packed::table_bytes(extent) + 2, &all, sizeof all);
+  for (std::size_t group = 0; group < 32; ++group)
+    bytes[packed::table_bytes(extent) + 6 + 2 * group] = std::byte{0xff};
+  std::vector<std::byte> samples(4096);
+  EXPECT_THROW(unpack_brick(ScalarType::u8, extent, bytes, samples), DamageError);
+}
+
 TEST(Packed, ANumberThatThePaletteLacksIsRefused) {
   const Int3 extent{16, 16, 16};
   auto bytes = pack_brick(ScalarType::u32, extent, make_brick(ScalarType::u32, extent, "labels"));
