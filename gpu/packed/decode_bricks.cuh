@@ -17,12 +17,8 @@
 
 namespace isobrick::inline v0::gpu {
 
-inline constexpr int kDecodeWarps = 4, kBlocksOfWarp = 4;
-/// Blocks of a brick that a block of threads decodes.
-inline constexpr int kBlocksOfDecodeBlock = kDecodeWarps * kBlocksOfWarp;
+inline constexpr int kBlocksOfWarp = 4, kDecodeWarps = kBlocksOfPart / kBlocksOfWarp;
 inline constexpr std::uint32_t kAllLanes = ~0u;
-
-static_assert(kBlocksOfDecodeBlock == 16, "as decode_params() has it");
 
 /// Unsigned integers of so many bytes.
 template <int kBytes>
@@ -377,7 +373,7 @@ template <int kSampleBytes, bool kFloating>
 __global__ void __launch_bounds__(32 * kDecodeWarps)
     decode_bricks(const __grid_constant__ DecodeParams p) {
   const PackedOnDevice brick = p.bricks[blockIdx.x / p.parts];
-  const std::uint32_t begin = blockIdx.x % p.parts * kBlocksOfDecodeBlock +
+  const std::uint32_t begin = blockIdx.x % p.parts * kBlocksOfPart +
                               (threadIdx.x >> 5) * static_cast<std::uint32_t>(kBlocksOfWarp);
   const auto count = static_cast<std::uint32_t>(p.blocks[0] * p.blocks[1] * p.blocks[2]);
   if (brick.is_plain) {

@@ -59,16 +59,18 @@ struct RangeCheckParams {
   unsigned long long* failed;  ///< as of DecodeParams
 };
 
+/// Blocks of a brick that a block of threads decodes.
+inline constexpr int kBlocksOfPart = 16;
+
 /// All but the bricks, for bricks of `extent` samples.
 inline DecodeParams decode_params(Int3 extent) {
-  constexpr std::uint32_t kBlocksOfPart = 16;
   const Int3 blocks = packed::blocks_of(extent);
   DecodeParams p{};
   for (int axis = 0; axis < 3; ++axis) {
     p.extent[axis] = static_cast<std::int32_t>(extent[axis]);
     p.blocks[axis] = static_cast<std::int32_t>(blocks[axis]);
   }
-  p.parts = (static_cast<std::uint32_t>(volume(blocks)) + kBlocksOfPart - 1) / kBlocksOfPart;
+  p.parts = static_cast<std::uint32_t>((volume(blocks) + kBlocksOfPart - 1) / kBlocksOfPart);
   return p;
 }
 

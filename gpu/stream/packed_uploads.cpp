@@ -75,10 +75,9 @@ void PackedUploads::launch(std::span<const UploadTracker::PendingBrick> bricks,
   launch_range_check(lattice_.type, ranges, stream.get());
 }
 
-std::optional<Int3> PackedUploads::damaged() const {
+std::optional<Int3> PackedUploads::damaged() {
   const unsigned long long number =
-      std::atomic_ref(const_cast<unsigned long long&>(failed_here_[0]))
-          .load(std::memory_order_relaxed);
+      std::atomic_ref(failed_here_[0]).load(std::memory_order_relaxed);
   if (number == kNoBrick) return std::nullopt;
   const Int3 grid = lattice_.bricks();
   const auto i = static_cast<Index>(number);

@@ -38,7 +38,7 @@ class PackedUploads {
   const Stream& decoded() const { return order_; }
 
   /// A brick that was found wrong, of those decoded so far.
-  std::optional<Int3> damaged() const;
+  std::optional<Int3> damaged();
 
  private:
   struct Load {
