@@ -79,9 +79,9 @@ std::vector<std::byte> encode_bytes(const CodecChain& chain, std::span<const std
 /// making. Throws DamageError when it does not. Nothing else is checked.
 std::uint64_t decoded_size(const CodecChain& chain, std::span<const std::byte> encoded);
 
-/// Decodes a full brick into `out`, native byte order; also one of an array that brick_bytes() does
-/// not measure, as its samples are stored in `sample_bytes` each, or it holds several volumes.
-/// Throws DamageError saying what is wrong, not where. Thread-safe.
+/// Decodes a full brick into exactly `out`, native byte order. Bricks that are not packed may have
+/// samples of another size, `sample_bytes` as stored, and hold several volumes. Throws DamageError
+/// saying what is wrong, not where. Thread-safe.
 void decode_brick(const CodecChain& chain, const Lattice& lattice, std::size_t sample_bytes,
                   std::span<const std::byte> encoded, std::span<std::byte> out);
 

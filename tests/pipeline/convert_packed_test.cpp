@@ -17,12 +17,7 @@ TEST(ConvertPacked, IsTheSameStoreButForItsBricks) {
   options.codec = BrickCodec::zstd;
   convert_quietly(source, folder / "zstd", options);
   const StoreReader a(folder / "packed"), b(folder / "zstd");
-  ASSERT_EQ(a.info().levels.size(), b.info().levels.size());
-  for (int level = 0; level < static_cast<int>(a.info().levels.size()); ++level) {
-    EXPECT_EQ(samples_of(a, level), samples_of(b, level));
-    const Box3 bricks{{0, 0, 0}, a.info().levels[static_cast<std::size_t>(level)].lattice.bricks()};
-    EXPECT_EQ(a.brick_ranges(level, bricks).ranges, b.brick_ranges(level, bricks).ranges);
-  }
+  expect_same_levels(a, b);
   EXPECT_EQ(a.info().codec, "packed");
   EXPECT_TRUE(a.info().ours);
   NoProgress progress;

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <gtest/gtest.h>
+
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -35,6 +37,18 @@ inline std::vector<std::byte> samples_of(const StoreReader& store, int level) {
   std::vector<std::byte> samples(bytes_of(lattice.extent, lattice.type));
   read_slab(store, level, lattice.box(), samples.data());
   return samples;
+}
+
+/// Expects the same samples, ranges and places in the world on all levels.
+inline void expect_same_levels(const StoreReader& a, const StoreReader& b) {
+  ASSERT_EQ(a.info().levels.size(), b.info().levels.size());
+  for (std::size_t i = 0; i < a.info().levels.size(); ++i) {
+    const int level = static_cast<int>(i);
+    EXPECT_EQ(samples_of(a, level), samples_of(b, level));
+    EXPECT_EQ(a.info().levels[i].transform, b.info().levels[i].transform);
+    const Box3 bricks{{0, 0, 0}, a.info().levels[i].lattice.bricks()};
+    EXPECT_EQ(a.brick_ranges(level, bricks).ranges, b.brick_ranges(level, bricks).ranges);
+  }
 }
 
 template <class T>
