@@ -32,11 +32,12 @@ constexpr std::array<NamedFormat, 7> kFormats{
      {MeshFormat::pvtp, ".pvtp", "PVTP"},
      {MeshFormat::neuroglancer, ".neuroglancer", "neuroglancer's format"}}};
 
-/// What a PLY file's faces may take of a budget until they are written: nothing of a small one,
-/// which the extraction needs.
-std::size_t faces_memory(std::uint64_t memory) {
+/// What the arrays of a file that come behind the vertices may take of a budget until they are
+/// written, rather than to be written and read once more: nothing of a small one, which the
+/// extraction needs.
+std::size_t waiting_memory(std::uint64_t memory) {
   constexpr std::uint64_t mib = std::uint64_t{1} << 20;
-  return memory < 512 * mib ? 0 : static_cast<std::size_t>(std::min(memory / 16, 64 * mib));
+  return memory < 512 * mib ? 0 : static_cast<std::size_t>(std::min(memory / 8, 1024 * mib));
 }
 
 /// Throws UsageError for levels that the format has not.
@@ -94,12 +95,13 @@ std::unique_ptr<MeshSink> create_mesh_file(const std::filesystem::path& path,
   check_levels(*format, options);
   switch (*format) {
     case MeshFormat::ply:
-      return std::make_unique<PlySink>(name, force, faces_memory(options.memory));
+      return std::make_unique<PlySink>(name, force, waiting_memory(options.memory));
     case MeshFormat::stl: return std::make_unique<StlSink>(name, force);
     case MeshFormat::obj: return std::make_unique<ObjSink>(name, force, options.threads);
     case MeshFormat::glb:
       return std::make_unique<GlbSink>(name, force, GlbOptions{.quantize = options.quantize});
-    case MeshFormat::vtp: return std::make_unique<VtpSink>(name, force);
+    case MeshFormat::vtp:
+      return std::make_unique<VtpSink>(name, force, waiting_memory(options.memory));
     case MeshFormat::pvtp: return std::make_unique<PvtpSink>(name, force);
     case MeshFormat::neuroglancer:
       return create_neuroglancer_mesh(path, force, options.sharded,
@@ -113,7 +115,8 @@ std::unique_ptr<MeshSink> create_mesh_file(const std::filesystem::path& path,
 
 std::uint64_t mesh_file_memory(MeshFormat format, int threads, std::uint64_t memory) {
   switch (format) {
-    case MeshFormat::ply: return faces_memory(memory);
+    case MeshFormat::ply:
+    case MeshFormat::vtp: return waiting_memory(memory);
     case MeshFormat::obj: return ObjSink::memory_with(threads);
     case MeshFormat::glb: return part_memory(GlbOptions{}.part_triangles);
     case MeshFormat::pvtp: return part_memory(PvtpSink::kPartTriangles);

@@ -42,10 +42,11 @@ void append_column(FileWriter& out, std::span<const std::byte> rows, std::size_t
 
 }  // namespace
 
-VtpSink::VtpSink(std::string path, bool force)
-    : out_(std::move(path), force, Streaming::when_complete),
-      normals_(open_scratch_beside(out_.path())),
-      triangles_(open_scratch_beside(out_.path())) {}
+VtpSink::VtpSink(std::string path, bool force, std::size_t memory)
+    : memory_(memory),
+      out_(std::move(path), force, Streaming::when_complete),
+      normals_(open_scratch_beside(out_.path(), memory / 3)),
+      triangles_(open_scratch_beside(out_.path(), memory - memory / 3)) {}
 
 void VtpSink::begin(const MeshHeader& header) {
   layout_.normals = header.has_normals;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -14,16 +15,19 @@ namespace isobrick::inline v0 {
 /// Writes a welded mesh as one VTK PolyData file; see VtpLayout.
 class VtpSink final : public MeshSink {
  public:
-  /// See OutputFile for what `path` and `force` may throw.
-  VtpSink(std::string path, bool force);
+  /// See OutputFile for what `path` and `force` may throw. Normals and triangles come behind all
+  /// points: so many bytes of them wait in memory, more in files without a name.
+  VtpSink(std::string path, bool force, std::size_t memory = 0);
 
   Indexing indexing() const override { return Indexing::welded; }
   void begin(const MeshHeader& header) override;
   void write(const MeshChunk& chunk) override;
   void finish() override;
   std::uint64_t bytes() const override;
+  std::uint64_t memory() const override { return memory_; }
 
  private:
+  std::size_t memory_;
   OutputFile out_;                      ///< header and points; the rest at the end
   FileWriter normals_, triangles_;      ///< wait until all points are written
   std::vector<FileWriter> attributes_;  ///< so do the values of each
