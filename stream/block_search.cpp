@@ -1,10 +1,36 @@
 #include "stream/block_search.h"
 
+#include <tbb/parallel_for.h>
+
 #include "index/active_tiles.h"
 #include "stream/index_search.h"
 
 namespace isobrick::inline v0 {
 namespace {
+
+/// Blocks along an edge of the cubes that are searched at the same time.
+constexpr Index kCubeEdge = 16;
+static_assert(StoreReader::kRangeChunk % kCubeEdge == 0);
+
+/// The tiles of a chunk with a block that the isovalue touches, in Morton order.
+void append_active_tiles(const RangeTable& table, double isovalue, std::vector<TileWork>& tiles) {
+  std::vector<Box3> cubes;
+  const Int3 edge{kCubeEdge, kCubeEdge, kCubeEdge};
+  for_each_morton(ceil_div(table.box.extent(), edge), [&](Int3 c) {
+    const Int3 lo = table.box.lo + c * kCubeEdge;
+    cubes.push_back(intersect({lo, lo + edge}, table.box));
+  });
+  const Int3 extent = table.box.extent();
+  const auto is_active = [&](Int3 block) {
+    return table.ranges[static_cast<std::size_t>(linear_index(block - table.box.lo, extent))]
+        .stabbed_by(isovalue);
+  };
+  std::vector<std::vector<TileWork>> found(cubes.size());
+  tbb::parallel_for(std::size_t{0}, cubes.size(),
+                    [&](std::size_t i) { append_tiles_where(cubes[i], is_active, found[i]); });
+  for (const std::vector<TileWork>& some : found)
+    tiles.insert(tiles.end(), some.begin(), some.end());
+}
 
 /// Looks at the range of every block.
 class RangeSearch final : public BlockSearch {
@@ -31,7 +57,7 @@ class RangeSearch final : public BlockSearch {
     if (cap)
       append_capped_tiles<double>(table.box, table.ranges, isovalue, *cap, tiles);
     else
-      append_active_tiles<double>(table.box, table.ranges, isovalue, tiles);
+      append_active_tiles(table, isovalue, tiles);
     std::erase_if(tiles, [&](const TileWork& work) { return !box.contains(work.tile); });
   }
 
