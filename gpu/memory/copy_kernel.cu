@@ -27,12 +27,25 @@ __global__ void __launch_bounds__(kThreads) copy_chunks(CopyChunks chunks) {
   for (; i < words; i += step) to[i] = __ldcs(from + i);
 }
 
+__global__ void report_copies(CopyReport* report, unsigned long long number,
+                              const unsigned long long* failed) {
+  if (failed) report->failed = *failed;
+  __threadfence_system();
+  *static_cast<volatile unsigned long long*>(&report->completed) = number;
+}
+
 }  // namespace
 
 void launch_copy(const CopyChunks& chunks, cudaStream_t stream) {
   if (chunks.count == 0) return;
   copy_chunks<<<dim3(kBlocksOfChunk, chunks.count), kThreads, 0, stream>>>(chunks);
   check_launch("copy_chunks");
+}
+
+void launch_report(CopyReport* report, unsigned long long number, const unsigned long long* failed,
+                   cudaStream_t stream) {
+  report_copies<<<1, 1, 0, stream>>>(report, number, failed);
+  check_launch("report_copies");
 }
 
 }  // namespace isobrick::gpu

@@ -29,4 +29,16 @@ struct CopyChunks {
 /// for each.
 void launch_copy(const CopyChunks& chunks, cudaStream_t stream);
 
+/// What a device tells the host about copies, in pinned memory: the host reads it without the
+/// driver, which admits one thread at a time.
+struct CopyReport {
+  unsigned long long completed = 0;  ///< number of the last request that is over
+  unsigned long long failed = 0;     ///< what `failed` of launch_report() points to
+};
+
+/// Reports, when all before it in the stream is over, that request `number` is. `failed` is read
+/// then, if it is not null.
+void launch_report(CopyReport* report, unsigned long long number, const unsigned long long* failed,
+                   cudaStream_t stream);
+
 }  // namespace isobrick::gpu

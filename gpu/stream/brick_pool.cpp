@@ -1,6 +1,6 @@
 #include "gpu/stream/brick_pool.h"
 
-#include <array>
+#include <atomic>
 #include <chrono>
 #include <exception>
 #include <mutex>
@@ -13,6 +13,7 @@
 #include "gpu/memory/copy_kernel.h"
 #include "gpu/memory/device_buffer.h"
 #include "gpu/memory/nvtx_range.h"
+#include "gpu/memory/pinned_buffer.h"
 #include "gpu/memory/pinned_region.h"
 #include "gpu/memory/upload_tracker.h"
 #include "gpu/stream/packed_uploads.h"
@@ -24,14 +25,14 @@ namespace {
 /// between two requests.
 constexpr std::size_t kRequestBytes = std::size_t{4} << 20;
 /// The same for packed bricks, decoded: a device decodes few as long as many.
-constexpr std::size_t kPackedRequestBytes = std::size_t{8} << 20;
+constexpr std::size_t kPackedRequestBytes = std::size_t{16} << 20;
 /// One request of so many is timed: events that record times slow all copies down.
 constexpr std::uint64_t kTimedOf = 16;
-/// Requests with an event of their own; all older ones are known to have completed.
-constexpr std::size_t kEvents = 16;
 /// Polls of a copy before the waiting thread sleeps between polls.
 constexpr int kBusyPolls = 64;
 constexpr std::chrono::microseconds kPollInterval{50};
+/// Polls until the driver is asked whether the device has failed.
+constexpr int kPollsOfDriver = 200;
 /// The pool is filled with this: a brick that is read before it was sent shows in the mesh.
 constexpr int kPoison = 0xff;
 
@@ -39,6 +40,7 @@ constexpr int kPoison = 0xff;
 
 struct BrickPool::Impl {
   int device;
+  Int3 grid;  ///< of bricks
   std::size_t brick_bytes, buffer_bytes;
   PinnedRegion buffers;  ///< of all threads
   DeviceBuffer<std::byte> memory;
@@ -48,14 +50,11 @@ struct BrickPool::Impl {
   UploadTracker uploads;
   std::optional<PackedUploads> packed;  ///< where bricks come packed
 
-  std::mutex taking;      ///< of `bricks`
-  Arena bricks;           ///< `memory`, which they fill without gaps
-  std::mutex requesting;  ///< of all below; `completions` may be polled without it
+  std::mutex taking;  ///< of `bricks`
+  Arena bricks;       ///< `memory`, which they fill without gaps
+  PinnedBuffer<CopyReport> report{1};
+  std::mutex requesting;  ///< of all below
   std::uint64_t requests = 0, bricks_sent = 0, bytes_sent = 0;
-  struct Completion : Event {
-    Completion() : Event(cudaEventDisableTiming) {}
-  };
-  std::array<Completion, kEvents> completions;
   Event all_sent{cudaEventDisableTiming}, timed_begin, timed_end;
   std::uint64_t timing = 0;  ///< bricks of the request that is being timed
   double timed_seconds = 0;
@@ -64,6 +63,7 @@ struct BrickPool::Impl {
 
   Impl(int id, const Lattice& lattice, std::size_t count, int threads, bool is_packed)
       : device(make_current(id)),
+        grid(lattice.bricks()),
         brick_bytes(lattice.brick_bytes()),
         buffer_bytes(BrickPool::buffer_bytes(lattice, is_packed)),
         buffers(id, {static_cast<std::size_t>(pinned_bytes(buffer_bytes, threads, is_packed))}),
@@ -71,6 +71,7 @@ struct BrickPool::Impl {
         uploads(threads, buffers_of_thread(buffer_bytes, is_packed)),
         bricks(memory.data(), memory.size(), 1) {
     if (is_packed) packed.emplace(lattice, uploads.buffers());
+    report[0] = {0, PackedUploads::kNoBrick};
     check(cudaMemsetAsync(memory.data(), kPoison, memory.size(), stream.get()));
     by_kernel = buffer_bytes % CopyChunks::kAlign == 0 && reads_host_memory(device);
     bricks_of_request =
@@ -94,26 +95,26 @@ struct BrickPool::Impl {
       if (uploads.state_of(oldest) == UploadTracker::State::filled) {
         const std::lock_guard lock(requesting);
         request();
-      } else if (const std::uint64_t number = uploads.request_of(oldest); has_completed(number)) {
-        uploads.completed(number);
+      } else if (const std::uint64_t over = completed(); over >= uploads.request_of(oldest)) {
+        uploads.completed(over);
       } else if (polls < kBusyPolls) {
         std::this_thread::yield();
       } else {
+        if (polls % kPollsOfDriver == 0) check_device();
         std::this_thread::sleep_for(kPollInterval);
       }
     }
   }
 
-  /// Whether a request that was made has completed.
-  bool has_completed(std::uint64_t request) {
+  /// The last request that has completed.
+  std::uint64_t completed() const {
+    return std::atomic_ref(report[0].completed).load(std::memory_order_acquire);
+  }
+
+  /// Throws what went wrong on the device.
+  void check_device() const {
     make_current(device);
-    const cudaError_t result = cudaEventQuery(completions[request % kEvents].get());
-    if (result == cudaErrorNotReady) {
-      (void)cudaGetLastError();  // or the next launch would report it
-      return false;
-    }
-    check(result);
-    return true;
+    (void)sent().is_over();
   }
 
   /// Requests the copies of all filled buffers; `requesting` is held.
@@ -145,7 +146,7 @@ struct BrickPool::Impl {
     }
     if (packed) packed->decode(filled, stream);
     ++requests;
-    completions[requests % kEvents].record(sent());
+    launch_report(report.on_device(), requests, packed ? packed->failed() : nullptr, sent().get());
     bricks_sent += filled.size();
     uploads.requested(filled, requests);
   }
@@ -215,7 +216,11 @@ std::optional<Int3> BrickPool::find_damaged(bool all) {
     impl_->request();
     impl_->sent().wait();
   }
-  return impl_->packed->damaged();
+  const auto number = std::atomic_ref(impl_->report[0].failed).load(std::memory_order_relaxed);
+  if (number == PackedUploads::kNoBrick) return std::nullopt;
+  const auto i = static_cast<Index>(number);
+  const Int3 grid = impl_->grid;
+  return Int3{i % grid.x, i / grid.x % grid.y, i / grid.x / grid.y};
 }
 
 void BrickPool::wait_on(const Stream& stream) {

@@ -1,32 +1,23 @@
 #include "gpu/stream/packed_uploads.h"
 
 #include <algorithm>
-#include <atomic>
 
 #include "gpu/memory/nvtx_range.h"
 #include "gpu/packed/decode_kernel.h"
 #include "packed/packed_layout.h"
 
 namespace isobrick::inline v0::gpu {
-namespace {
-
-constexpr unsigned long long kNoBrick = ~0ull;
-
-}  // namespace
 
 PackedUploads::PackedUploads(const Lattice& lattice, std::size_t buffers)
     : lattice_(lattice),
       buffer_bytes_(packed_room(lattice)),
       loads_(buffers),
       memory_(buffers * buffer_bytes_),
-      failed_(1),
-      failed_here_(1) {
-  failed_here_[0] = kNoBrick;
-  check(cudaMemcpy(failed_.data(), failed_here_.data(), failed_.bytes(), cudaMemcpyHostToDevice));
+      failed_(1) {
+  check(cudaMemcpy(failed_.data(), &kNoBrick, failed_.bytes(), cudaMemcpyHostToDevice));
 }
 
 PackedUploads::~PackedUploads() { (void)cudaStreamSynchronize(order_.get()); }
-
 void PackedUploads::set(std::size_t buffer, std::span<const std::byte> packed, Int3 brick,
                         ValueRange<double> range) {
   const packed::BrickLayout layout(lattice_.type, lattice_.brick, packed);
@@ -45,8 +36,6 @@ void PackedUploads::decode(std::span<const UploadTracker::PendingBrick> bricks,
            own.stream);
   own.decoded.record(own.stream);
   check(cudaStreamWaitEvent(order_.get(), own.decoded.get()));
-  check(cudaMemcpyAsync(failed_here_.data(), failed_.data(), failed_.bytes(),
-                        cudaMemcpyDeviceToHost, order_.get()));
 }
 
 void PackedUploads::launch(std::span<const UploadTracker::PendingBrick> bricks,
@@ -73,15 +62,6 @@ void PackedUploads::launch(std::span<const UploadTracker::PendingBrick> bricks,
   }
   launch_decode(lattice_.type, decode, stream.get());
   launch_range_check(lattice_.type, ranges, stream.get());
-}
-
-std::optional<Int3> PackedUploads::damaged() {
-  const unsigned long long number =
-      std::atomic_ref(failed_here_[0]).load(std::memory_order_relaxed);
-  if (number == kNoBrick) return std::nullopt;
-  const Int3 grid = lattice_.bricks();
-  const auto i = static_cast<Index>(number);
-  return Int3{i % grid.x, i / grid.x % grid.y, i / grid.x / grid.y};
 }
 
 }  // namespace isobrick::gpu

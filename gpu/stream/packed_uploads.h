@@ -3,7 +3,6 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <optional>
 #include <span>
 #include <vector>
 
@@ -11,7 +10,6 @@
 #include <isobrick/range.h>
 #include "gpu/memory/cuda_objects.h"
 #include "gpu/memory/device_buffer.h"
-#include "gpu/memory/pinned_buffer.h"
 #include "gpu/memory/upload_tracker.h"
 
 namespace isobrick::inline v0::gpu {
@@ -37,8 +35,10 @@ class PackedUploads {
   /// What comes after all bricks that were decoded so far, in the order of the calls.
   const Stream& decoded() const { return order_; }
 
-  /// A brick that was found wrong, of those decoded so far.
-  std::optional<Int3> damaged();
+  /// On the device: the number of a brick that was found wrong, of those decoded so far, or
+  /// kNoBrick.
+  const unsigned long long* failed() const { return failed_.data(); }
+  static constexpr unsigned long long kNoBrick = ~0ull;
 
  private:
   struct Load {
@@ -66,7 +66,6 @@ class PackedUploads {
   std::vector<Load> loads_;  ///< of each buffer
   DeviceBuffer<std::byte> memory_;
   DeviceBuffer<unsigned long long> failed_;
-  PinnedBuffer<unsigned long long> failed_here_;
 };
 
 }  // namespace isobrick::gpu
