@@ -5,6 +5,7 @@
 #include <cstring>
 
 #include "gpu/memory/cuda_check.h"
+#include "gpu/memory/device_scope.h"
 
 namespace isobrick::inline v0::gpu {
 
@@ -36,5 +37,12 @@ DeviceInfo open_device(int device) {
   check(cudaMemGetInfo(&free, &total));
   return {properties.name, free, total};
 }
+
+DeviceScope::DeviceScope(int device) noexcept {
+  (void)cudaGetDevice(&before_);
+  if (device != before_) (void)cudaSetDevice(device);
+}
+
+DeviceScope::~DeviceScope() { (void)cudaSetDevice(before_); }
 
 }  // namespace isobrick::gpu

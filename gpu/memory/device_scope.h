@@ -1,19 +1,14 @@
 #pragma once
 
-#include <cuda_runtime_api.h>
-
 namespace isobrick::inline v0::gpu {
 
 /// Makes a device the calling thread's, until the scope ends.
 class DeviceScope {
  public:
-  explicit DeviceScope(int device) noexcept {
-    (void)cudaGetDevice(&before_);
-    if (device != before_) (void)cudaSetDevice(device);
-  }
+  explicit DeviceScope(int device) noexcept;
   DeviceScope(const DeviceScope&) = delete;
   DeviceScope& operator=(const DeviceScope&) = delete;
-  ~DeviceScope() { (void)cudaSetDevice(before_); }
+  ~DeviceScope();
 
  private:
   int before_ = 0;

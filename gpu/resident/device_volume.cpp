@@ -32,8 +32,8 @@ std::vector<Int3> all_tiles(const Lattice& lattice, bool in_morton_order) {
 }  // namespace
 
 DeviceVolume::Impl::Impl(const Lattice& l, double fill, const DeviceTiles& wanted,
-                         std::size_t staging_bytes)
-    : lattice(l), fill_value(fill) {
+                         std::size_t staging_bytes, Stream s)
+    : lattice(l), fill_value(fill), stream(std::move(s)) {
   if (volume(l.tiles()) >= kNone)
     throw UsageError("the volume has too many tiles to be resident on a device");
   tile_blocks = DeviceBuffer<std::byte>((wanted.loaded.size() + 1) * block_bytes(), stream);
@@ -91,6 +91,23 @@ void DeviceVolume::Impl::load(std::span<const Int3> more, const BrickLookup& bri
     load_staged(more.first(count), bricks);
     more = more.subspan(count);
   }
+  complete_if_loaded();
+}
+
+std::byte* DeviceVolume::Impl::take_blocks(std::span<const Int3> more,
+                                           const std::function<bool(std::size_t)>& has_samples) {
+  if (more.size() > loaded_blocks() - loaded_)
+    throw UsageError("more tiles are loaded than the volume has room for");
+  const std::size_t first = loaded_ + 1;
+  for (std::size_t i = 0; i < more.size(); ++i)
+    if (has_samples(i))
+      table_[static_cast<std::size_t>(linear_index(more[i], lattice.tiles()))] =
+          static_cast<std::uint32_t>(first + i);
+  loaded_ += more.size();
+  return tile_blocks.data() + first * block_bytes();
+}
+
+void DeviceVolume::Impl::complete_if_loaded() {
   if (loaded_ == loaded_blocks()) complete();
 }
 
@@ -99,18 +116,15 @@ void DeviceVolume::Impl::load_staged(std::span<const Int3> more, const BrickLook
   Staging& staging = staging_[turn_];
   turn_ ^= 1;
   staging.copied.wait();
-  const std::size_t first = loaded_ + 1;
+  std::vector<char> has_samples(more.size());
   tbb::parallel_for(std::size_t{0}, more.size(), [&](std::size_t i) {
-    const bool any = gather_tile_block(lattice, bricks, fill_value, more[i],
+    has_samples[i] = gather_tile_block(lattice, bricks, fill_value, more[i],
                                        staging.blocks.data() + i * block_bytes());
-    if (any)
-      table_[static_cast<std::size_t>(linear_index(more[i], lattice.tiles()))] =
-          static_cast<std::uint32_t>(first + i);
   });
-  check(cudaMemcpyAsync(tile_blocks.data() + first * block_bytes(), staging.blocks.data(),
-                        more.size() * block_bytes(), cudaMemcpyHostToDevice, stream.get()));
+  std::byte* const to = take_blocks(more, [&](std::size_t i) { return has_samples[i] != 0; });
+  check(cudaMemcpyAsync(to, staging.blocks.data(), more.size() * block_bytes(),
+                        cudaMemcpyHostToDevice, stream.get()));
   staging.copied.record(stream);
-  loaded_ += more.size();
 }
 
 /// All samples are there, or on their way.
@@ -153,13 +167,19 @@ TileParams DeviceVolume::Impl::params() const {
 
 DeviceVolume::DeviceVolume(const Lattice& lattice, const BrickLookup& bricks, double fill_value) {
   const std::vector<Int3> searched = all_tiles(lattice, true), loaded = all_tiles(lattice, false);
-  impl_ = std::make_unique<Impl>(lattice, fill_value, DeviceTiles{searched, loaded}, kStagingBytes);
+  impl_ = std::make_unique<Impl>(lattice, fill_value, DeviceTiles{searched, loaded}, kStagingBytes,
+                                 Stream());
   impl_->load(loaded, bricks);
 }
 
 DeviceVolume::DeviceVolume(const Lattice& lattice, double fill_value, const DeviceTiles& tiles,
                            std::size_t staging_bytes)
-    : impl_(std::make_unique<Impl>(lattice, fill_value, tiles, staging_bytes)) {}
+    : impl_(std::make_unique<Impl>(lattice, fill_value, tiles, staging_bytes, Stream())) {}
+DeviceVolume::DeviceVolume(const Lattice& lattice, double fill_value, const DeviceTiles& tiles,
+                           const DeviceTarget& target)
+    : impl_(std::make_unique<Impl>(
+          lattice, fill_value, tiles, 0,
+          Stream(target.stream, target.memory ? target.memory : pool_memory()))) {}
 DeviceVolume::DeviceVolume(const DeviceArray& array) : impl_(std::make_unique<Impl>(array)) {}
 DeviceVolume::~DeviceVolume() = default;
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <vector>
 
@@ -25,11 +26,18 @@ struct DeviceVolume::Impl {
   std::optional<ArrayBlocks> array;  ///< where it is one of an array, instead of the blocks
 
   Impl(const Lattice& lattice, double fill_value, const DeviceTiles& tiles,
-       std::size_t staging_bytes);
+       std::size_t staging_bytes, Stream stream);
   explicit Impl(const DeviceArray& samples);
   ~Impl();
 
   void load(std::span<const Int3> tiles, const BrickLookup& bricks);
+  /// The blocks of the next tiles, one behind the other, which the caller fills in the order of
+  /// `stream`. Tiles for which has_samples(i) is false share the block of the fill value.
+  std::byte* take_blocks(std::span<const Int3> tiles,
+                         const std::function<bool(std::size_t)>& has_samples);
+  /// After the blocks are filled, or are to be filled by what is in the stream: finds the ranges
+  /// when they were the last, and waits.
+  void complete_if_loaded();
   /// What the kernels need to find samples; block 0 is that of the fill value.
   TileParams params() const;
   std::size_t grid_tiles() const { return static_cast<std::size_t>(volume(lattice.tiles())); }

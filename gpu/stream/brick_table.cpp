@@ -16,10 +16,10 @@ struct Need {
 
 /// The bricks that the tile's samples, `reach` layers around included, lie in.
 Box3 bricks_around(const Lattice& lattice, Index reach, Int3 tile) {
-  const Index edge = kTileEdge + 1 + reach;
+  const Index before = std::max<Index>(reach, 0), edge = kTileEdge + 1 + reach;
   const Int3 lo = tile * kTileEdge;
   return lattice.bricks_of(
-      intersect({lo - Int3{reach, reach, reach}, lo + Int3{edge, edge, edge}}, lattice.box()));
+      intersect({lo - Int3{before, before, before}, lo + Int3{edge, edge, edge}}, lattice.box()));
 }
 
 /// Collects the bricks of a launch, each looked up once.
@@ -51,7 +51,27 @@ class Needs {
   std::vector<Need> all_;
 };
 
+void put_box(const Box3& box, BrickBox& to) {
+  const Int3 grid = box.extent();
+  for (int axis = 0; axis < 3; ++axis) {
+    to.first[axis] = static_cast<std::int32_t>(box.lo[axis]);
+    to.count[axis] = static_cast<std::int32_t>(grid[axis]);
+  }
+}
+
 }  // namespace
+
+void locate_bricks(const Lattice& lattice, std::span<const Int3> tiles, const BrickLookup& bricks,
+                   const BrickTable& table) {
+  const std::size_t of_tile = max_bricks_of_tile(lattice, kFirstCorners);
+  for (std::size_t i = 0; i < tiles.size(); ++i) {
+    const Box3 around = bricks_around(lattice, kFirstCorners, tiles[i]);
+    put_box(around, table.boxes[i]);
+    std::uint64_t* address = table.addresses.data() + i * of_tile;
+    for_each_point(around,
+                   [&](Int3 b) { *address++ = reinterpret_cast<std::uint64_t>(bricks.find(b)); });
+  }
+}
 
 BrickUse use_bricks(const Lattice& lattice, Index reach, std::span<const TileWork> tiles,
                     const BrickLookup& bricks, std::size_t places, const std::byte* device,
@@ -64,10 +84,7 @@ BrickUse use_bricks(const Lattice& lattice, Index reach, std::span<const TileWor
     const Int3 grid = around.extent();
     std::uint64_t* addresses = table.addresses.data() + i * of_tile;
     std::fill_n(addresses, volume(grid), 0);
-    for (int axis = 0; axis < 3; ++axis) {
-      table.boxes[i].first[axis] = static_cast<std::int32_t>(around.lo[axis]);
-      table.boxes[i].count[axis] = static_cast<std::int32_t>(grid[axis]);
-    }
+    put_box(around, table.boxes[i]);
     for_each_needed_box(lattice, tiles[i], reach, [&](Box3 box) {
       for_each_point(lattice.bricks_of(box), [&](Int3 b) {
         // Boxes of a tile mostly share their bricks.

@@ -34,4 +34,8 @@ BrickUse use_bricks(const Lattice& lattice, Index reach, std::span<const TileWor
                     const BrickLookup& bricks, std::size_t places, const std::byte* device,
                     const BrickTable& table);
 
+/// Fills the table for the 32³ samples of these tiles, with the places that `bricks` has.
+void locate_bricks(const Lattice& lattice, std::span<const Int3> tiles, const BrickLookup& bricks,
+                   const BrickTable& table);
+
 }  // namespace isobrick::gpu

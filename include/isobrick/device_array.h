@@ -24,6 +24,14 @@ class ISOBRICK_API DeviceMemory {
   virtual void free(void* memory, std::size_t bytes, CUstream_st* stream) noexcept = 0;
 };
 
+/// What the work and the memory of surfaces on a device belong to.
+struct DeviceTarget {
+  /// All work and all memory are of this stream (a cudaStream_t), which must outlive the meshes;
+  /// null: the default stream.
+  CUstream_st* stream = nullptr;
+  std::shared_ptr<DeviceMemory> memory = {};  ///< null: a pool that keeps what meshes give back
+};
+
 /// Samples in the memory of a CUDA device. Owns nothing: they must stay as they are until the work
 /// that reads them is over.
 struct DeviceArray {

@@ -35,6 +35,9 @@ class ISOBRICK_API DeviceVolume {
   /// pass through twice `staging_bytes` of pinned memory, at least a block's. Throws as above.
   DeviceVolume(const Lattice& lattice, double fill_value, const DeviceTiles& tiles,
                std::size_t staging_bytes);
+  /// The same, for a loader within the library that has the samples on the device already.
+  DeviceVolume(const Lattice& lattice, double fill_value, const DeviceTiles& tiles,
+               const DeviceTarget& target);
   /// Of an array of the current device, which must stay as it is: extractors copy the tiles that
   /// surfaces look at. Finds the ranges of all tiles and waits for them. Strides are given,
   /// multiples of a sample.

@@ -235,31 +235,30 @@ ExtractPlan plan_gpu_memory(PassRequests requests, const ExtractOptions& options
   return plan;
 }
 
-std::optional<ExtractPlan> plan_resident_memory(PassRequests requests, std::uint64_t budget,
-                                                std::uint64_t other_bytes) {
+std::uint64_t least_resident_memory(PassRequests requests, std::uint64_t other_bytes,
+                                    std::size_t sinks) {
   const Lattice& lattice = common(requests).level->lattice;
-  const std::size_t tile_bricks = max_bricks_of_tile(lattice, 0);
-  const std::uint64_t tile_bytes = kTileVolume * lattice.sample_bytes();
   std::uint64_t sink = 0;
   for (const ExtractRequest& request : requests) sink = std::max(sink, request.sink_bytes);
+  return fixed_bytes(common(requests)) + kCudaDriver + other_bytes + sinks * sink +
+         (requests.size() - 1) * kSinkBuffers +
+         static_cast<std::uint64_t>(volume(lattice.tiles())) * kBytesOfListedTile +
+         2 * kTileVolume * lattice.sample_bytes();
+}
+
+std::optional<ExtractPlan> plan_resident_memory(PassRequests requests, std::uint64_t budget,
+                                                std::uint64_t other_bytes) {
+  const std::uint64_t tile_bytes = kTileVolume * common(requests).level->lattice.sample_bytes();
   ExtractPlan plan;
   plan.sinks = std::min(requests.size(), kMaxSinks);
-  const auto fixed_with_sinks = [&] {
-    return fixed_bytes(common(requests)) + kCudaDriver + other_bytes + plan.sinks * sink +
-           (requests.size() - 1) * kSinkBuffers +
-           static_cast<std::uint64_t>(volume(lattice.tiles())) * kBytesOfListedTile;
-  };
-  const std::uint64_t least_room = 2 * tile_bytes + tile_bricks * lattice.brick_bytes();
-  while (plan.sinks > 1 && budget < fixed_with_sinks() + least_room) --plan.sinks;
-  const std::uint64_t fixed = fixed_with_sinks(), least = fixed + least_room;
+  const auto least_bytes = [&] { return least_resident_memory(requests, other_bytes, plan.sinks); };
+  while (plan.sinks > 1 && budget < least_bytes()) --plan.sinks;
+  const std::uint64_t least = least_bytes();
   if (budget < least) return std::nullopt;
   plan.limits.output_bytes =
       std::min(tile_bytes + (budget - least) / 8, std::max(tile_bytes, kMaxChunk));
   plan.limits.tiles = plan.limits.output_bytes / tile_bytes;
-  const std::uint64_t used = fixed + 2 * plan.limits.output_bytes;
-  plan.cache_bricks = fit_cache(requests, budget - used, tile_bricks);
-  plan.batch_bricks = std::max(tile_bricks, plan.cache_bricks / 4);
-  plan.bytes = used + plan.cache_bricks * lattice.brick_bytes();
+  plan.bytes = least + 2 * (plan.limits.output_bytes - tile_bytes);
   return plan;
 }
 

@@ -73,9 +73,12 @@ ExtractPlan plan_gpu_memory(PassRequests requests, const ExtractOptions& options
                             std::uint64_t other_bytes, GpuSession& gpu);
 
 /// The same for surfaces that are made one after the other from samples kept on a GPU
-/// (resident_pass.h). `limits.output_bytes` are those of a pinned buffer, of which there are two.
-/// None where the budget is too small.
+/// (resident_pass.h). `other_bytes` includes those of loading them. `limits.output_bytes` are those
+/// of a pinned buffer, of which there are two. None where the budget is too small.
 std::optional<ExtractPlan> plan_resident_memory(PassRequests requests, std::uint64_t budget,
                                                 std::uint64_t other_bytes);
+/// The least budget for it, with so many sinks at a time.
+std::uint64_t least_resident_memory(PassRequests requests, std::uint64_t other_bytes,
+                                    std::size_t sinks = 1);
 
 }  // namespace isobrick

@@ -7,8 +7,8 @@
 #include <isobrick/device.h>
 #include <isobrick/error.h>
 #include "gpu/memory/host_memory.h"
-#include "gpu/stream/brick_pool.h"
 #include "gpu/stream/gpu_extractor.h"
+#include "pipeline/extract/device_bricks.h"
 
 namespace isobrick::inline v0 {
 namespace {
@@ -23,32 +23,6 @@ class HostBricks final : public BrickMemory {
 
  private:
   int device_;
-};
-
-/// Bricks on the device.
-class DeviceBricks final : public BrickMemory {
- public:
-  /// `packed_bytes`: the most that a packed brick takes; 0: bricks are decoded before.
-  DeviceBricks(std::shared_ptr<gpu::BrickPool> pool, std::size_t ahead, std::size_t packed_bytes)
-      : pool_(std::move(pool)), ahead_(ahead), packed_bytes_(packed_bytes) {}
-  std::shared_ptr<std::byte> room(std::size_t bytes) override {
-    return {pool_, pool_->take(bytes)};
-  }
-  std::byte* begin(int thread, std::byte*) override { return pool_->begin(thread); }
-  void end(int thread, std::byte* place) override { pool_->end(thread, place); }
-  bool takes_packed() const override { return packed_bytes_ > 0; }
-  std::span<std::byte> begin_packed(int thread) override {
-    return {pool_->begin(thread), packed_bytes_};
-  }
-  void end_packed(int thread, std::byte* place, const PackedLoad& brick) override {
-    pool_->end_packed(thread, place, brick.bytes, brick.brick, brick.range);
-  }
-  std::optional<Int3> find_damaged(bool all) override { return pool_->find_damaged(all); }
-  std::size_t bricks_ahead() const override { return ahead_; }
-
- private:
-  std::shared_ptr<gpu::BrickPool> pool_;
-  std::size_t ahead_, packed_bytes_;
 };
 
 class CudaSession final : public GpuSession {
@@ -96,14 +70,12 @@ class CudaSession final : public GpuSession {
   bool make_pool(const Lattice& lattice) {
     const gpu::PoolSizes& pool = sizes_.front().pool;
     try {
-      pool_ = std::make_shared<gpu::BrickPool>(device_, lattice, pool.bricks, pool.threads,
-                                               pool.packed);
+      auto bricks = std::make_unique<DeviceBricks>(device_, lattice, pool);
+      pool_ = bricks->pool();
+      bricks_ = std::move(bricks);
     } catch (const gpu::OutOfDeviceMemory&) {
       return false;
     }
-    bricks_ = std::make_unique<DeviceBricks>(
-        pool_, gpu::bricks_ahead(lattice, pool),
-        pool.packed ? gpu::BrickPool::buffer_bytes(lattice, true) : 0);
     return true;
   }
 

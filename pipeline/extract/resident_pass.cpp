@@ -9,7 +9,7 @@
 #include <isobrick/device_volume.h>
 #include <isobrick/error.h>
 #include "core/stopwatch.h"
-#include "gpu/resident/resident_sizes.h"
+#include "pipeline/extract/device_loader.h"
 #include "pipeline/extract/sink_writers.h"
 #include "pipeline/workers.h"
 
@@ -19,47 +19,42 @@ namespace {
 /// The driver gets memory that is allocated in the order of a stream in pieces of so much.
 constexpr std::uint64_t kPieceOfDriver = std::uint64_t{32} << 20;
 
-/// Decoded bricks, which only processors read.
-class HeapBricks final : public BrickMemory {
- public:
-  std::shared_ptr<std::byte> room(std::size_t bytes) override { return allocate_bricks(bytes); }
-};
-
-/// What the surfaces of a pass look at.
-struct PassTiles {
-  std::vector<Int3> searched, loaded;  ///< gpu::DeviceTiles
-  std::uint64_t active = 0;            ///< of the isovalue that has most
-
-  gpu::ResidentTiles count() const { return {searched.size(), loaded.size(), active}; }
-};
-
 class ResidentPass {
  public:
   ResidentPass(const StoreReader& store, const ExtractOptions& options,
                const PassSurfaces& surfaces, const ExtractPlan& plan, const gpu::DeviceInfo& device,
                Progress& progress)
-      : store_(store),
-        options_(options),
+      : options_(options),
         surfaces_(surfaces),
         plan_(plan),
         device_(device),
         progress_(progress),
+        loader_(store, options.level, surfaces.requests.front(), options.device),
         budget_(options.gpu_memory > 0 ? options.gpu_memory
                                        : device.free_bytes - device.free_bytes / 10) {}
 
   /// False where the device has no room, or fails: then streaming has its turn.
-  bool load(TileStream& tiles) {
-    const std::optional<PassTiles> found = find_tiles(tiles);
-    if (!found) return false;
-    const gpu::ResidentSizes sizes = gpu::resident_sizes(lattice(), found->count(), any_normals());
-    if (sizes.volume_bytes + sizes.extractor_bytes + kPieceOfDriver > budget_) return false;
+  bool load(TileStream& stream) {
+    const std::uint64_t max_tiles = budget_ / (kTileVolume * lattice().sample_bytes());
+    const std::optional<SurfaceTiles> tiles =
+        find_surface_tiles(stream, lattice(), reach_of(surfaces_.requests), max_tiles);
+    if (!tiles) return false;
+    report_search(stream, surfaces_.reports);
+    const gpu::ResidentSizes sizes = gpu::resident_sizes(lattice(), tiles->count(), any_normals());
+    const std::uint64_t beside = std::max(sizes.extractor_bytes, loader_.device_bytes());
+    if (sizes.volume_bytes + beside + kPieceOfDriver > budget_) return false;
     try {
       volume_.emplace(lattice(), common().surface.fill_value,
-                      gpu::DeviceTiles{found->searched, found->loaded}, plan_.limits.output_bytes);
+                      gpu::DeviceTiles{tiles->searched, tiles->loaded}, 0);
+      read(tiles->loaded);
+    } catch (const DamageError&) {
+      throw;
+    } catch (const Cancelled&) {
+      throw;
     } catch (const Error&) {
       return false;
     }
-    return decode(found->loaded);
+    return true;
   }
 
   /// Makes the surfaces from the first on, as many as the device has room for. A kernel takes
@@ -151,66 +146,22 @@ class ResidentPass {
         static_cast<std::uint64_t>(part * static_cast<double>(bytes_of(request) / 2)));
   }
 
-  /// None where the samples of the tiles alone are too much for the device.
-  std::optional<PassTiles> find_tiles(TileStream& tiles) {
-    const std::uint64_t max_tiles = budget_ / (kTileVolume * lattice().sample_bytes());
-    PassTiles found;
-    std::vector<std::uint64_t> active(tiles.isovalues());
-    while (const std::optional<TileWork> work = tiles.next()) {
-      if (found.searched.size() == max_tiles) return std::nullopt;
-      found.searched.push_back(work->tile);
-      for (std::size_t i = 0; i < active.size(); ++i) active[i] += tiles.blocks_of_each()[i] != 0;
-    }
-    found.searched.shrink_to_fit();
-    found.active = *std::max_element(active.begin(), active.end());
-    found.loaded = gpu::tiles_to_load(lattice(), found.searched, reach_of(surfaces_.requests));
-    report_search(tiles, surfaces_.reports);
-    return found;
-  }
-
-  /// False where the device fails.
-  bool decode(std::span<const Int3> loaded) {
-    std::vector<TileWork> work;
-    work.reserve(loaded.size());
-    for (const Int3 tile : loaded) work.push_back({tile, 0xff});
-    TileStream stream(std::move(work));
-    BatchPlanner batches(stream, lattice(), kFirstCorners, true, plan_.limits.tiles,
-                         plan_.batch_bricks);
-    HeapBricks memory;
-    BatchDecoder decoder(store_, options_.level, batches, 0, plan_.cache_bricks, common().threads,
-                         memory);
-    std::uint64_t bytes = 0, done = 0;
+  void read(std::span<const Int3> tiles) {
+    std::uint64_t bytes = 0;
     for (const ExtractRequest& request : surfaces_.requests) bytes += bytes_of(request);
-    double decode_seconds = 0;
-    for (;;) {
-      std::shared_ptr<const DecodedBatch> batch;
-      {
-        const Stopwatch watch(decode_seconds);
-        batch = decoder.next();
-      }
-      if (!batch) break;
-      std::vector<Int3> tiles;
-      for (const TileWork& tile : batch->tiles()) tiles.push_back(tile.tile);
-      try {
-        const Stopwatch watch(upload_.seconds);
-        volume_->load(tiles, *batch);
-      } catch (const Error&) {
-        return false;
-      }
+    loader_.load(*volume_, tiles, plan_.limits.tiles, [&](std::size_t done) {
       // Half of the way is that the samples are there.
-      done += tiles.size();
-      const auto part = static_cast<double>(done) / static_cast<double>(loaded.size());
+      const auto part = static_cast<double>(done) / static_cast<double>(tiles.size());
       const auto now = static_cast<std::uint64_t>(part * static_cast<double>(bytes / 2));
       progress_.advance(now - std::exchange(shown_, now));
-    }
-    upload_.bytes = loaded.size() * kTileVolume * lattice().sample_bytes();
-    report_bricks(decoder.bricks_read(), decoder.reads(), decode_seconds, surfaces_.reports);
-    return true;
+    });
+    report_bricks(loader_.bricks_read(), loader_.reads(), loader_.wait_seconds(),
+                  surfaces_.reports);
   }
 
   void add_report(ExtractReport& report, const gpu::ResidentExtractor& extractor) const {
     static_cast<SurfaceReport&>(report) = extractor.report();
-    report.upload = upload_;
+    report.upload = loader_.upload();
     report.device_bytes += volume_->bytes();
     report.backend = "cuda";
     report.device = device_.name;
@@ -219,15 +170,14 @@ class ResidentPass {
     report.device_bytes_in_use = device_.free_bytes - std::min(free, device_.free_bytes);
   }
 
-  const StoreReader& store_;
   const ExtractOptions& options_;
   const PassSurfaces& surfaces_;
   const ExtractPlan& plan_;
   const gpu::DeviceInfo& device_;
   Progress& progress_;
+  DeviceLoader loader_;
   std::uint64_t budget_;     ///< of device memory
-  std::uint64_t shown_ = 0;  ///< progress of decoding
-  StageReport upload_;
+  std::uint64_t shown_ = 0;  ///< progress of loading
   std::optional<gpu::DeviceVolume> volume_;
   std::vector<std::unique_ptr<gpu::ResidentExtractor>> extractors_;  ///< with the meshes to write
 };
@@ -239,7 +189,9 @@ ResidentPassResult run_resident_pass(const StoreReader& store, const ExtractOpti
                                      std::uint64_t other_bytes,
                                      const std::function<void(std::size_t)>& begin,
                                      Progress& progress) {
-  const auto plan = plan_resident_memory(surfaces.requests, options.memory, other_bytes);
+  const DeviceLoader loader(store, options.level, surfaces.requests.front(), options.device);
+  const auto plan =
+      plan_resident_memory(surfaces.requests, options.memory, other_bytes + loader.pinned_bytes());
   if (!plan) return {};
   return Workers(surfaces.requests.front().threads).execute([&]() -> ResidentPassResult {
     gpu::DeviceInfo device;

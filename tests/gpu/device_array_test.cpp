@@ -6,7 +6,7 @@
 #include <isobrick/device_volume.h>
 #include <isobrick/error.h>
 #include "gpu/memory/device_buffer.h"
-#include "gpu/resident/array_extractor.h"
+#include "gpu/resident/cached_extractor.h"
 #include "tests/gpu/resident.h"
 #include "tests/gpu/strided_samples.h"
 
@@ -15,7 +15,7 @@
 namespace isobrick::testing {
 namespace {
 
-using gpu::ArrayExtractor;
+using gpu::CachedExtractor;
 using gpu::check;
 
 constexpr std::uint64_t kAnyMemory = ~std::uint64_t{0};
@@ -43,7 +43,7 @@ SurfaceOptions surface(double isovalue, Int3 extent, bool normals = false) {
   return options;
 }
 
-DeviceMesh extract(ArrayExtractor& extractor, const SurfaceOptions& options,
+DeviceMesh extract(CachedExtractor& extractor, const SurfaceOptions& options,
                    std::uint64_t max_bytes = kAnyMemory) {
   return extractor.finish(extractor.begin(options, max_bytes));
 }
@@ -66,7 +66,7 @@ TYPED_TEST(GpuArray, OfAnyLayoutIsTheMeshOfTheCpu) {
   for (const SampleLayout& layout : kSampleLayouts) {
     SCOPED_TRACE(layout.name);
     const ArrayOnDevice<TypeParam> on_device(field, layout);
-    ArrayExtractor extractor(on_device.array);
+    CachedExtractor extractor(on_device.array);
     for (const bool normals : {false, true})
       for (const double isovalue : {mid, mid + 0.5, mid - 90}) {
         const SurfaceOptions options = surface(isovalue, field.extent, normals);
@@ -79,7 +79,7 @@ TYPED_TEST(GpuArray, OfAnyExtentIsTheMeshOfTheCpu) {
   for (const Int3 extent : {Int3{1, 1, 1}, Int3{2, 2, 2}, Int3{32, 33, 64}, Int3{131, 70, 97}}) {
     const auto field = this->waves(extent);
     const ArrayOnDevice<TypeParam> on_device(field);
-    ArrayExtractor extractor(on_device.array);
+    CachedExtractor extractor(on_device.array);
     const SurfaceOptions options = surface(this->lowest() + 100.5, extent, true);
     expect_same(expected_mesh(field, options), extract(extractor, options).download());
   }
@@ -90,7 +90,7 @@ class GpuArrayOf : public DeviceTest<float> {};
 TEST_F(GpuArrayOf, NaNIsTheMeshOfTheCpu) {
   const auto field = with_nan(noise({67, 41, 75}, 2), 3, 20);
   const ArrayOnDevice<float> on_device(field, kSampleLayouts[4]);
-  ArrayExtractor extractor(on_device.array);
+  CachedExtractor extractor(on_device.array);
   const SurfaceOptions options = surface(0, field.extent, true);
   expect_same(expected_mesh(field, options), extract(extractor, options).download());
 }
@@ -108,7 +108,7 @@ TEST_F(GpuArrayOf, AStreamOfTheCallersOrdersAll) {
   DeviceArray array = DeviceArray::of(static_cast<const float*>(to.data()), field.extent);
   array.strides = from.array.strides;
   array.stream = stream.get();
-  ArrayExtractor extractor(array);
+  CachedExtractor extractor(array);
   const DeviceMesh mesh = extract(extractor, options);
   EXPECT_EQ(mesh.stream(), stream.get());
   gpu::Stream other;
@@ -152,7 +152,7 @@ TEST_F(GpuArrayOf, MemoryOfTheCallersIsAllThatIsTaken) {
   array.memory = memory;
   DeviceMesh mesh;
   {
-    ArrayExtractor extractor(array);
+    CachedExtractor extractor(array);
     EXPECT_GT(memory->held, 0);
     mesh = extract(extractor, surface(0, field.extent));
     // Later meshes take their memory once.
@@ -178,7 +178,7 @@ TEST_F(GpuArrayOf, MemoryIsThatOfWhatTheSurfaceTouches) {
   const auto memory = std::make_shared<CountingMemory>();
   DeviceArray array = on_device.array;
   array.memory = memory;
-  ArrayExtractor extractor(array);
+  CachedExtractor extractor(array);
   const SurfaceOptions options = surface(500, field.extent, true);
   const DeviceMesh mesh = extract(extractor, options, 30 << 20);
   EXPECT_LT(memory->most, 30 << 20);
@@ -192,7 +192,7 @@ TEST_F(GpuArrayOf, ManyIsovaluesOneAfterTheOther) {
     return static_cast<double>(p.x) + 3 * std::sin(static_cast<double>(p.y + 2 * p.z) * 0.1);
   });
   const ArrayOnDevice<float> on_device(field);
-  ArrayExtractor extractor(on_device.array);
+  CachedExtractor extractor(on_device.array);
   for (const double isovalue : {10.0, 60.0, 100.0, 150.0, 190.0, 15.0, 100.0})
     for (const bool normals : {false, true}) {
       const SurfaceOptions options = surface(isovalue, field.extent, normals);
@@ -203,7 +203,7 @@ TEST_F(GpuArrayOf, ManyIsovaluesOneAfterTheOther) {
 TEST_F(GpuArrayOf, PendingMeshes) {
   const auto field = waves({131, 70, 97});
   const ArrayOnDevice<float> on_device(field);
-  ArrayExtractor extractor(on_device.array);
+  CachedExtractor extractor(on_device.array);
   const SurfaceOptions first = surface(0, field.extent), second = surface(20, field.extent);
   const std::uint64_t superseded = extractor.begin(first, kAnyMemory);
   const std::uint64_t number = extractor.begin(second, kAnyMemory);
@@ -220,7 +220,7 @@ TEST_F(GpuArrayOf, MeshesOutliveTheirExtractorAndOneAnother) {
   std::vector<DeviceMesh> meshes;
   {
     const ArrayOnDevice<float> on_device(field);
-    ArrayExtractor extractor(on_device.array);
+    CachedExtractor extractor(on_device.array);
     for (const double isovalue : {0.0, 30.0, -20.0, 1e9})
       meshes.push_back(extract(extractor, surface(isovalue, field.extent)));
   }
@@ -232,9 +232,9 @@ TEST_F(GpuArrayOf, MeshesOutliveTheirExtractorAndOneAnother) {
 
 TEST_F(GpuArrayOf, WhatMakesNoSenseIsRefused) {
   const auto field = waves({40, 40, 40});
-  EXPECT_THROW(ArrayExtractor(DeviceArray::of(field.samples.data(), field.extent)), UsageError);
+  EXPECT_THROW(CachedExtractor(DeviceArray::of(field.samples.data(), field.extent)), UsageError);
   const ArrayOnDevice<float> on_device(field);
-  ArrayExtractor extractor(on_device.array);
+  CachedExtractor extractor(on_device.array);
   SurfaceOptions dropping = surface(0, field.extent);
   dropping.drop_degenerate = true;
   EXPECT_THROW(extract(extractor, dropping), UsageError);

@@ -7,6 +7,7 @@
 #include "core/threshold.h"
 #include "gpu/resident/array_blocks.cuh"
 #include "gpu/resident/array_ranges.cuh"
+#include "gpu/resident/gather_tiles.cuh"
 #include "gpu/search/search_tiles.cuh"
 #include "gpu/stream/unpack_tiles.cuh"
 #include "gpu/tile/extract_tiles.cuh"
@@ -109,6 +110,18 @@ void run_load(ScalarType type, const gpu::ArrayLoadParams& p, unsigned seed) {
   visit_order(type, p.array, [&](auto tag, auto order) {
     using T = typename decltype(tag)::type;
     launch(3, gpu::kArrayThreads, 0, seed, [&] { gpu::copy_tiles<T, decltype(order)::value>(p); });
+  });
+}
+
+void run_gather(ScalarType type, const gpu::GatherParams& params, unsigned seed) {
+  visit_scalar(type, [&](auto tag) {
+    using T = typename decltype(tag)::type;
+    launch(params.count, gpu::kGatherThreads, 0, seed, [&] {
+      if (gpu::has_pieces<T>(params))
+        gpu::gather_tiles<T, gpu::SamplePiece<T>>(params);
+      else
+        gpu::gather_tiles<T, T>(params);
+    });
   });
 }
 

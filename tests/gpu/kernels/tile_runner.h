@@ -2,6 +2,7 @@
 
 #include <isobrick/scalar.h>
 #include "gpu/resident/array_params.h"
+#include "gpu/resident/gather_params.h"
 #include "gpu/search/search_params.h"
 #include "gpu/stream/unpack_params.h"
 #include "gpu/tile/tile_params.h"
@@ -28,6 +29,7 @@ void run_first_columns(ScalarType type, const void* tile_blocks, std::uint32_t c
                        void* columns);
 void run_array_ranges(ScalarType type, const gpu::ArrayRangeParams& params, unsigned seed);
 void run_load(ScalarType type, const gpu::ArrayLoadParams& params, unsigned seed);
+void run_gather(ScalarType type, const gpu::GatherParams& params, unsigned seed);
 void run_unpack(ScalarType type, const gpu::UnpackParams& params, unsigned seed);
 
 }  // namespace isobrick::emulated

@@ -1,20 +1,24 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 
 #include <isobrick/device_volume.h>
 
 namespace isobrick::inline v0::gpu {
 
-/// Isosurfaces of an array: a volume of it, and an extractor for the options of the last surface.
+/// Isosurfaces of a volume on a device, and an extractor for the options of the last surface.
 /// Leaves the calling thread's current device as it was. Not thread-safe.
-class ArrayExtractor {
+class CachedExtractor {
  public:
-  /// Strides are given, multiples of a sample. Throws UsageError for samples that are not in a
-  /// device's memory.
-  explicit ArrayExtractor(const DeviceArray& array);
-  ~ArrayExtractor();
+  /// Of an array. Strides are given, multiples of a sample. Throws UsageError for samples that are
+  /// not in a device's memory.
+  explicit CachedExtractor(const DeviceArray& array);
+  /// Of the tiles that are loaded to a device.
+  CachedExtractor(int device, const Transform& transform, std::unique_ptr<DeviceVolume> volume,
+                  bool may_have_nan);
+  ~CachedExtractor();
 
   const Lattice& lattice() const { return volume_->lattice(); }
   const Transform& transform() const { return transform_; }
@@ -30,7 +34,8 @@ class ArrayExtractor {
  private:
   int device_;
   Transform transform_;
-  std::optional<DeviceVolume> volume_;
+  std::unique_ptr<DeviceVolume> volume_;
+  bool may_have_nan_;
   SurfaceOptions options_;       ///< of the extractor
   std::uint64_t max_bytes_ = 0;  ///< likewise
   std::optional<ResidentExtractor> extractor_;

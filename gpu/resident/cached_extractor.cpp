@@ -1,6 +1,8 @@
-#include "gpu/resident/array_extractor.h"
+#include "gpu/resident/cached_extractor.h"
 
 #include <fmt/format.h>
+
+#include <utility>
 
 #include "core/length_unit.h"
 #include "gpu/memory/cuda_check.h"
@@ -24,25 +26,33 @@ bool are_alike(const SurfaceOptions& a, const SurfaceOptions& b) {
 
 }  // namespace
 
-ArrayExtractor::ArrayExtractor(const DeviceArray& array)
+CachedExtractor::CachedExtractor(const DeviceArray& array)
     : device_(device_of(array.samples)), transform_(array.transform) {
   const DeviceScope scope(device_);
-  volume_.emplace(array);
+  volume_ = std::make_unique<DeviceVolume>(array);
+  may_have_nan_ = volume_->has_nan();
 }
 
-ArrayExtractor::~ArrayExtractor() {
+CachedExtractor::CachedExtractor(int device, const Transform& transform,
+                                 std::unique_ptr<DeviceVolume> volume, bool may_have_nan)
+    : device_(device),
+      transform_(transform),
+      volume_(std::move(volume)),
+      may_have_nan_(may_have_nan) {}
+
+CachedExtractor::~CachedExtractor() {
   const DeviceScope scope(device_);
   extractor_.reset();
   volume_.reset();
 }
 
-std::uint64_t ArrayExtractor::begin(SurfaceOptions options, std::uint64_t max_bytes) {
+std::uint64_t CachedExtractor::begin(SurfaceOptions options, std::uint64_t max_bytes) {
   const DeviceScope scope(device_);
   if (volume_->bytes() > max_bytes)
-    throw UsageError(
-        fmt::format("--gpu-memory is too small: the ranges alone take {} bytes", volume_->bytes()));
+    throw UsageError(fmt::format(
+        "--gpu-memory is too small: samples and ranges alone take {} bytes", volume_->bytes()));
   options.transform = transform_;
-  options.may_have_nan = volume_->has_nan();
+  options.may_have_nan = may_have_nan_;
   if (!extractor_ || max_bytes != max_bytes_ || !are_alike(options, options_)) {
     extractor_.reset();
     extractor_.emplace(*volume_, options, ResidentTuning{}, max_bytes - volume_->bytes());
@@ -55,11 +65,11 @@ std::uint64_t ArrayExtractor::begin(SurfaceOptions options, std::uint64_t max_by
   return ++begun_;
 }
 
-bool ArrayExtractor::is_over(std::uint64_t number) const {
+bool CachedExtractor::is_over(std::uint64_t number) const {
   return number != begun_ || is_finished_ || extractor_->is_over();
 }
 
-DeviceMesh ArrayExtractor::finish(std::uint64_t number) {
+DeviceMesh CachedExtractor::finish(std::uint64_t number) {
   if (number != begun_ || is_finished_)
     throw UsageError("this mesh is taken already, or its extractor has begun another");
   const DeviceScope scope(device_);
