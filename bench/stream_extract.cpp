@@ -1,4 +1,5 @@
-// A store to a mesh in host memory through the GPU, beside each of its stages alone.
+// A store to a mesh in host memory through the GPU, and to one left on the device, beside each of
+// the stages alone.
 //
 //   isobrick synth gyroid g.zarr --dims 1024,1024,1024 --type u16
 //   bench_stream_extract g.zarr --isovalue 32767.5 --gpu-memory 256M --memory 1G
@@ -11,6 +12,7 @@
 // the store is dropped from the page cache before each extraction, and before the reads alone.
 // Built as in bench/README.md.
 
+#include <cuda_runtime_api.h>
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <tbb/enumerable_thread_specific.h>
@@ -25,6 +27,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include <isobrick/device_extractor.h>
 #include <isobrick/error.h>
 #include <isobrick/extract.h>
 #include "bench/copies.h"
@@ -167,6 +170,15 @@ struct Measured {
   }
 };
 
+/// The same with the mesh left on the device, until it is whole.
+double extract_to_device_once(const StoreReader& store, const Arguments& a) {
+  if (a.cold) drop_from_cache(a.store);
+  const auto start = Clock::now();
+  const DeviceMesh mesh = extract_to_device(store, a.options);
+  if (cudaEventSynchronize(mesh.ready()) != cudaSuccess) throw Error("the device failed");
+  return seconds_since(start);
+}
+
 Measured measure(const StoreReader& store, const Arguments& a, const std::vector<Int3>& bricks) {
   Measured measured;
   Workers workers(a.options.threads);
@@ -180,6 +192,7 @@ Measured measure(const StoreReader& store, const Arguments& a, const std::vector
   for (int turn = 0; turn < a.turns; ++turn) {
     measured.reports.push_back(extract_once());
     measured.seconds["whole"].push_back(measured.reports.back().seconds);
+    measured.seconds["to_device"].push_back(extract_to_device_once(store, a));
     if (a.cold) drop_from_cache(a.store);
     workers.execute([&] {
       measured.seconds["read"].push_back(read_alone(store, a.options.level, bricks));
@@ -210,6 +223,7 @@ int run(Arguments a) {
   // What was dropped is decoded again.
   const double decode = alone["decode"] * static_cast<double>(r.brick_reads) /
                         static_cast<double>(std::max<std::uint64_t>(r.bricks_read, 1));
+  const double to_device = median(measured.seconds.at("to_device"));
   // As if nothing passed before the first brick and after the last. What the plan takes is not
   // added: decoding begins inside of it.
   const double prediction = std::max(decode, slowest->second);
@@ -217,6 +231,7 @@ int run(Arguments a) {
   out["seconds"] = r.seconds;
   out["first_seconds"] = measured.first_seconds;
   for (const auto& [name, seconds] : measured.seconds) out["turns"][name] = seconds;
+  out["to_device_seconds"] = to_device;
   out["plan_seconds"] = r.plan_seconds;
   out["wait_seconds"] = {{"bricks", r.decode_seconds}, {"gpu", r.surface_seconds}};
   out["prediction"] = prediction;
@@ -246,10 +261,10 @@ int run(Arguments a) {
     fmt::print("{}\n", out.dump());
   } else {
     fmt::print(
-        "{} triangles in {:.3f} s (first {:.3f}), predicted {:.3f}; slowest alone: {} {:.3f}, "
-        "ratio {:.2f}\n",
+        "{} triangles in {:.4f} s (first {:.3f}), predicted {:.4f}; slowest alone: {} {:.4f}, "
+        "ratio {:.2f}; left on the device in {:.4f} s\n",
         r.triangles, r.seconds, measured.first_seconds, prediction, slowest->first, slowest->second,
-        slowest->second / r.seconds);
+        slowest->second / r.seconds, to_device);
     fmt::print(
         "  of that {:.3f} s to plan, {:.3f} waiting for bricks, {:.3f} for the GPU to take them; "
         "{} bricks read {} times; {} launches; {:.1f} MiB of device "

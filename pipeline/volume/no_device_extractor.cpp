@@ -1,7 +1,7 @@
 #include <isobrick/device_extractor.h>
 #include <isobrick/error.h>
 
-// Without CUDA no array is in device memory, and nobody has any of these.
+// Without CUDA nothing is in device memory, and nobody has any of these.
 
 namespace isobrick::inline v0 {
 namespace {
@@ -21,11 +21,19 @@ bool PendingDeviceMesh::is_ready() const { refuse_device(); }
 DeviceMesh PendingDeviceMesh::get() { refuse_device(); }
 
 DeviceExtractor::DeviceExtractor(const DeviceArray&) { refuse_device(); }
+DeviceExtractor::DeviceExtractor(const StoreReader&, const ExtractOptions&, const DeviceTarget&,
+                                 Progress&) {
+  refuse_device();
+}
 DeviceExtractor::~DeviceExtractor() = default;
 DeviceExtractor::DeviceExtractor(DeviceExtractor&&) noexcept = default;
 DeviceMesh DeviceExtractor::extract(const ExtractOptions&) { refuse_device(); }
 PendingDeviceMesh DeviceExtractor::extract_async(const ExtractOptions&) { refuse_device(); }
 DeviceMesh extract(const DeviceArray&, const ExtractOptions&) { refuse_device(); }
+DeviceMesh extract_to_device(const StoreReader&, const ExtractOptions&, const DeviceTarget&,
+                             Progress&) {
+  refuse_device();
+}
 
 DeviceMesh::DeviceMesh() = default;
 DeviceMesh::DeviceMesh(std::shared_ptr<const Impl>) {}

@@ -33,6 +33,7 @@ if(CUDA)
   execute_process(COMMAND nvidia-smi RESULT_VARIABLE no_device OUTPUT_QUIET ERROR_QUIET)
   if(no_device EQUAL 0)
     run(${WORK}/build/device)
+    run(${WORK}/build/device_store ${WORK}/sphere.zarr)
   endif()
 endif()
 
