@@ -17,7 +17,7 @@ Axis order: arrays and all that indexes them (shape, roi, brick) are [z, y, x]. 
 Long operations take `progress=`, leave the GIL to other threads, and end within a second of Ctrl-C.
 """
 
-from ._device import DeviceMesh, DeviceRows
+from ._device import DeviceMesh, DeviceRows, DeviceVolume
 from ._errors import DamageError, Error, FileError, UsageError
 from ._extract import Extractor, extract
 from ._isobrick import __version__
@@ -33,6 +33,7 @@ __all__ = [
     "DamageError",
     "DeviceMesh",
     "DeviceRows",
+    "DeviceVolume",
     "Error",
     "Extractor",
     "FileError",

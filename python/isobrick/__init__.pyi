@@ -115,6 +115,30 @@ class DeviceMesh:
     def __len__(self) -> int: ...
     def to_host(self) -> Mesh: ...
 
+class DeviceVolume:
+    shape: tuple[int, int, int]
+    dtype: np.dtype[Any]
+    @overload
+    def extract(
+        self,
+        isovalue: _Isovalue,
+        *,
+        roi: _Roi = None,
+        normals: bool = False,
+        inside: Optional[_Inside] = None,
+        progress: _Progress = None,
+    ) -> DeviceMesh: ...
+    @overload
+    def extract(
+        self,
+        isovalue: _Isovalues,
+        *,
+        roi: _Roi = None,
+        normals: bool = False,
+        inside: Optional[_Inside] = None,
+        progress: _Progress = None,
+    ) -> list[DeviceMesh]: ...
+
 class Extractor:
     def __init__(
         self,
@@ -417,6 +441,33 @@ class Volume:
         device: int = 0,
         progress: _Progress = None,
     ) -> list[Mesh]: ...
+    def extract_to_device(
+        self,
+        isovalue: _Isovalue,
+        *,
+        level: int = 0,
+        roi: _Roi = None,
+        normals: bool = False,
+        inside: Optional[_Inside] = None,
+        device: int = 0,
+        gpu_memory: _Bytes = 0,
+        memory: _Bytes = ...,
+        threads: int = 0,
+        stream: Any = None,
+        progress: _Progress = None,
+    ) -> DeviceMesh: ...
+    def to_device(
+        self,
+        *,
+        level: int = 0,
+        roi: _Roi = None,
+        device: int = 0,
+        gpu_memory: _Bytes = 0,
+        memory: _Bytes = ...,
+        threads: int = 0,
+        stream: Any = None,
+        progress: _Progress = None,
+    ) -> DeviceVolume: ...
     def extract_labels(
         self,
         labels: Union[int, Sequence[int], ArrayLike, None] = None,

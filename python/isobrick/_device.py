@@ -1,9 +1,9 @@
-"""Arrays in the memory of a CUDA device, and the meshes that are made there."""
+"""Samples in the memory of a CUDA device, and the meshes that are made there."""
 
 import numpy as np
 
 from . import _isobrick
-from ._arguments import transform
+from ._arguments import box_of, extract_options, is_list, transform
 from ._errors import UsageError
 from ._mesh import Mesh
 
@@ -20,7 +20,7 @@ def is_on_device(array):
     )
 
 
-def _stream_number(stream):
+def stream_number(stream):
     """A cudaStream_t, from a number or a stream of PyTorch, CuPy or Numba."""
     for name in ("cuda_stream", "ptr", "handle"):
         stream = getattr(stream, name, stream)
@@ -42,7 +42,7 @@ class DeviceSamples:
         if mask is not None or nodata is not None:
             raise UsageError("arrays in device memory take no mask and no nodata; use NaN instead")
         place = transform(spacing, origin, direction, unit or "")
-        stream = None if stream is None else _stream_number(stream)
+        stream = None if stream is None else stream_number(stream)
         if hasattr(array, "__cuda_array_interface__"):
             self.native = self._of_interface(array.__cuda_array_interface__, place, stream)
         else:
@@ -70,6 +70,55 @@ class DeviceSamples:
             interface["data"][0], shape, interface.get("strides"), dtype.kind, dtype.itemsize,
             place, stream,
         )
+
+
+class DeviceVolume:
+    """A level of a volume whose samples were read to the memory of a CUDA device.
+
+    `isobrick.Volume.to_device` makes it. Any number of isovalues are then extracted without the
+    disk and the bus; samples and meshes stay on the device. `shape` [z, y, x] and `dtype` are
+    those of the level.
+    """
+
+    __slots__ = ("_native", "_volume", "_options", "shape", "dtype")
+
+    def __init__(self, native, volume, options):
+        self._native = native
+        self._volume = volume  # which knows what texts stand for as isovalues
+        self._options = options
+        self.shape = tuple(native.shape)
+        self.dtype = np.dtype(native.dtype)
+
+    def extract(self, isovalue, *, roi=None, normals=False, inside=None, progress=None):
+        """The surface of an isovalue as a `DeviceMesh`; the mesh of `Volume.extract`.
+
+        Parameters
+        ----------
+        isovalue : float, str, or a list of them
+            A number, or a text as of `Volume.isovalue()`, such as "otsu". A list gives a list of
+            meshes.
+        roi : slices [z, y, x], optional
+            Only these samples, within those that were read.
+        normals : bool
+            Adds normals, from the gradient of the samples.
+        inside : "above", "below" or None
+            Which samples are inside. None: below in a level set, else above.
+        progress : function or tqdm, optional
+            Of finding an isovalue for a text.
+        """
+        if is_list(isovalue):
+            return [
+                self.extract(one, roi=roi, normals=normals, inside=inside, progress=progress)
+                for one in isovalue
+            ]
+        options = extract_options(
+            self._volume.isovalue(isovalue, progress=progress), box=box_of(roi, self.shape),
+            normals=normals, inside=inside, **self._options,
+        )
+        return DeviceMesh(self._native.extract(options))
+
+    def __repr__(self):
+        return f"<isobrick.DeviceVolume: shape {self.shape}, {self.dtype}>"
 
 
 class DeviceRows:

@@ -5,14 +5,21 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from . import _isobrick
 from ._arguments import (
     box_of, byte_count, extract_options, filter_options, histogram_bins, integer, is_list,
     label_options, mesh_file_options, number, one_isovalue, path_text, thread_count, unit_text,
 )
+from ._device import DeviceMesh, DeviceVolume, stream_number
 from ._errors import UsageError
 from ._indexing import read_indexed
 from ._mesh import Mesh, meshes_of, with_measure
 from ._progress import reporting
+
+
+def _stream(stream):
+    """The number of a stream; 0: the default one."""
+    return 0 if stream is None else stream_number(stream)
 
 
 @dataclass(frozen=True)
@@ -233,6 +240,52 @@ class Volume:
         options = self._surface(isovalue, **request)
         with reporting(progress) as report:
             return Mesh._of(self._native.extract(options, filters, report))
+
+    def extract_to_device(
+        self, isovalue, *, level=0, roi=None, normals=False, inside=None, device=0, gpu_memory=0,
+        memory=2**30, threads=0, stream=None, progress=None,
+    ):
+        """The surface of an isovalue as a `DeviceMesh`: the mesh of `extract`, on a CUDA device.
+
+        Only the bricks that the surface touches are read; packed ones are decoded on the device.
+
+        Parameters
+        ----------
+        isovalue, level, roi, normals, inside, memory, threads, progress
+            As of `extract`.
+        device : int
+            Of the CUDA devices, from 0.
+        gpu_memory : int or str
+            Budget of device memory in bytes, or a text such as "8G"; 0: what the device has.
+        stream : optional
+            A stream of PyTorch, CuPy or Numba, or a number, that the work and the mesh belong to.
+        """
+        options = self._surface(
+            isovalue, level=level, roi=roi, normals=normals, inside=inside, device=device,
+            gpu_memory=gpu_memory, memory=memory, threads=threads, progress=progress,
+        )
+        with reporting(progress) as report:
+            return DeviceMesh(
+                _isobrick.extract_to_device(self._native, options, _stream(stream), report)
+            )
+
+    def to_device(
+        self, *, level=0, roi=None, device=0, gpu_memory=0, memory=2**30, threads=0, stream=None,
+        progress=None,
+    ):
+        """Reads a level, or a region of it, to a CUDA device, for any number of isovalues.
+
+        Returns a `DeviceVolume`. The parameters are those of `extract_to_device`.
+        """
+        options = self._surface(
+            0, level=level, roi=roi, device=device, gpu_memory=gpu_memory, memory=memory,
+            threads=threads, progress=progress,
+        )
+        with reporting(progress) as report:
+            native = _isobrick.DeviceExtractor.of_volume(
+                self._native, options, _stream(stream), report
+            )
+        return DeviceVolume(native, self, {"level": level, "gpu_memory": gpu_memory})
 
     def extract_labels(
         self, labels=None, *, level=0, roi=None, background=0, smooth=0, pass_band=0.1,

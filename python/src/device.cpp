@@ -10,12 +10,16 @@
 #include <utility>
 
 #include <isobrick/error.h>
+#include <isobrick/open_volume.h>
+#include <isobrick/store_reader.h>
 #include "python/src/bindings.h"
 #include "python/src/casters.h"
 #include "python/src/dlpack.h"
+#include "python/src/interruptible.h"
 #include "python/src/sample_array.h"
 
-// Arrays in the memory of a device: as __cuda_array_interface__ and DLPack describe them.
+// Samples in the memory of a device: arrays as __cuda_array_interface__ and DLPack describe them,
+// and what was read of a volume.
 
 namespace isobrick::python {
 namespace {
@@ -84,26 +88,52 @@ class TakenTensor {
   ManagedTensor* managed_;
 };
 
-/// Surfaces of an array in device memory.
+/// Surfaces of samples in device memory.
 class PythonDeviceExtractor {
  public:
   PythonDeviceExtractor(const DeviceArray& array, std::unique_ptr<const TakenTensor> tensor)
-      : tensor_(std::move(tensor)), extractor_(array), array_(array) {}
+      : tensor_(std::move(tensor)), extractor_(array), extent_(array.extent), type_(array.type) {}
+  PythonDeviceExtractor(DeviceExtractor extractor, Int3 extent, ScalarType type)
+      : extractor_(std::move(extractor)), extent_(extent), type_(type) {}
 
   DeviceMesh extract(const ExtractOptions& options) {
     const py::gil_scoped_release release;
     const std::lock_guard lock(mutex_);
     return extractor_.extract(options);
   }
-  Int3 shape() const { return array_.extent; }
-  std::string type() const { return std::string(zarr_name(array_.type)); }
+  Int3 shape() const { return extent_; }
+  std::string type() const { return std::string(zarr_name(type_)); }
 
  private:
-  std::unique_ptr<const TakenTensor> tensor_;  ///< the array's memory; null: the package keeps it
+  std::unique_ptr<const TakenTensor> tensor_;  ///< an array's memory; null: the package keeps it
   std::mutex mutex_;
   DeviceExtractor extractor_;
-  DeviceArray array_;  ///< how it was described
+  Int3 extent_;
+  ScalarType type_;
 };
+
+std::unique_ptr<PythonDeviceExtractor> extractor_of_store(const OpenedVolume& volume,
+                                                          ExtractOptions options,
+                                                          std::uintptr_t stream,
+                                                          const py::object& callback) {
+  return interruptible(callback, [&](Reporter reporter) {
+    options.cancel = reporter.cancel;
+    const StoreReader& store = volume.store();
+    DeviceExtractor extractor(store, options, {.stream = stream_of(stream)}, reporter.progress);
+    const auto level = static_cast<std::size_t>(options.level);
+    return std::make_unique<PythonDeviceExtractor>(
+        std::move(extractor), store.info().levels[level].lattice.extent, store.info().type);
+  });
+}
+
+DeviceMesh mesh_of_store(const OpenedVolume& volume, ExtractOptions options, std::uintptr_t stream,
+                         const py::object& callback) {
+  return interruptible(callback, [&](Reporter reporter) {
+    options.cancel = reporter.cancel;
+    return extract_to_device(volume.store(), options, {.stream = stream_of(stream)},
+                             reporter.progress);
+  });
+}
 
 std::unique_ptr<PythonDeviceExtractor> extractor_of(
     DeviceArray array, const Transform& transform, std::uintptr_t stream,
@@ -183,6 +213,7 @@ void bind_device_mesh(py::module_& module) {
 
 void bind_device(py::module_& module) {
   bind_device_mesh(module);
+  module.def("extract_to_device", &mesh_of_store);
   py::class_<PythonDeviceExtractor>(module, "DeviceExtractor")
       .def_static("of_pointer",
                   [](std::uintptr_t pointer, Int3 shape, std::optional<Int3> strides, char kind,
@@ -197,6 +228,7 @@ void bind_device(py::module_& module) {
             const DeviceArray array = tensor->array();
             return extractor_of(array, transform, stream, std::move(tensor));
           })
+      .def_static("of_volume", &extractor_of_store)
       .def("extract", &PythonDeviceExtractor::extract)
       .def_property_readonly("shape", &PythonDeviceExtractor::shape)
       .def_property_readonly("dtype", &PythonDeviceExtractor::type);

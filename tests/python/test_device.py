@@ -184,3 +184,51 @@ def test_memory_that_makes_no_sense_is_refused():
 
 def test_host_memory_is_no_device_memory():
     refused(isobrick.Error, "CUDA", Described(ball()))
+
+
+@pytest.fixture(scope="module")
+def packed(tmp_path_factory):
+    path = tmp_path_factory.mktemp("packed") / "ball.zarr"
+    isobrick.convert(ball((90, 80, 70)), path, compression="packed", spacing=(1, 2, 3), unit="mm")
+    return isobrick.open(path)
+
+
+def _needs_device(volume):
+    try:
+        return volume.extract_to_device(60)
+    except isobrick.Error as error:
+        if "no CUDA device" in str(error) or "without CUDA" in str(error):
+            pytest.skip(str(error))
+        raise
+
+
+def test_meshes_of_volumes_stay_on_the_device(packed):
+    _needs_device(packed)
+    for level in (0, 1):
+        host = packed.extract(60, level=level, normals=True)
+        back = packed.extract_to_device(60, level=level, normals=True).to_host()
+        assert np.array_equal(back.vertices, host.vertices)
+        assert np.array_equal(back.normals, host.normals)
+        assert np.array_equal(back.faces, host.faces)
+        assert back.unit == "mm"
+
+
+def test_a_volume_on_the_device_has_many_surfaces(packed):
+    _needs_device(packed)
+    roi = np.s_[3:60, :, 5:]
+    resident = packed.to_device(roi=roi)
+    assert resident.shape == packed.shape and resident.dtype == packed.dtype
+    for isovalue, mesh in zip((40, 60), resident.extract([40, 60])):
+        host = packed.extract(isovalue, roi=roi)
+        assert np.array_equal(mesh.to_host().vertices, host.vertices)
+    with pytest.raises(ValueError, match="reaches beyond"):
+        resident.extract(40, roi=np.s_[:, :, :])
+    with pytest.raises(ValueError, match="device"):
+        packed.to_device(device=99)
+
+
+def test_volumes_need_a_device(packed):
+    try:
+        packed.to_device()
+    except isobrick.Error as error:
+        assert "CUDA" in str(error)
