@@ -213,6 +213,13 @@ def test_meshes_of_volumes_stay_on_the_device(packed):
         assert back.unit == "mm"
 
 
+def test_the_device_makes_the_mesh_of_the_processor(packed):
+    _needs_device(packed)
+    host, device = (packed.extract(60, backend=backend) for backend in ("cpu", "cuda"))
+    assert np.array_equal(host.vertices, device.vertices)
+    assert np.array_equal(host.faces, device.faces)
+
+
 def test_a_volume_on_the_device_has_many_surfaces(packed):
     _needs_device(packed)
     roi = np.s_[3:60, :, 5:]

@@ -158,6 +158,12 @@ TEST_F(Cuda, FilesAreThoseOfTheCpu) {
       compare(store, ".ply", {});
       compare(store, ".ply", {"--normals", "gradient"});
     }
+  for (const std::string type : {"u8", "i16", "i32", "f32", "f64"}) {
+    SCOPED_TRACE(type + ", packed");
+    const std::string store = waves(type, {"--brick", "32", "--codec", "packed"});
+    compare(store, ".ply", {"--normals", "gradient"});
+    compare(store, ".ply", {"--level", "1", "--roi", "5:50,:,10:"});
+  }
   const std::string store = waves("u8", {"--brick", "32"});
   compare(store, ".stl", {});
   compare(store, ".ply", {"--level", "1"});
@@ -237,7 +243,9 @@ TEST_F(ResidentCuda, FilesAreThoseOfTheCpu) {
                                                       {"f32", {"0.01", "0.25", "-0.25"}},
                                                       {"f64", {"0.01", "0.25", "-0.25"}}};
   for (const auto& [type, isovalues] : isovalues_of) {
-    const std::string store = waves(type, {"--brick", type == "u8" ? "20" : "32"});
+    const bool packed = type == "u16" || type == "f32";
+    const std::string store =
+        waves(type, {"--brick", type == "u8" ? "20" : "32", "--codec", packed ? "packed" : "zstd"});
     SCOPED_TRACE(type);
     const nlohmann::json made = compare_all(store, isovalues, ".ply", {}, "256M", 3);
     ASSERT_EQ(made["passes"].size(), 1u);
