@@ -29,7 +29,7 @@ struct CopyChunks {
 /// for each.
 void launch_copy(const CopyChunks& chunks, cudaStream_t stream);
 
-/// What a device tells the host about copies, in pinned memory: the host reads it without the
+/// What a device reports of copies, in pinned memory: the host reads it without the
 /// driver, which admits one thread at a time.
 struct CopyReport {
   unsigned long long completed = 0;  ///< number of the last request that is over

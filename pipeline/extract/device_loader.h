@@ -39,7 +39,7 @@ class DeviceLoader {
   std::uint64_t device_bytes() const;
 
   /// Loads all tiles that `volume` has room for, at most `tiles_at_once` at a time, and waits.
-  /// `done` is told how many have been begun so far. Throws the errors of reading and decoding,
+  /// Calls `done` with how many have been begun so far. Throws the errors of reading and decoding,
   /// and OutOfDeviceMemory.
   void load(gpu::DeviceVolume& volume, std::span<const Int3> tiles, std::size_t tiles_at_once,
             const std::function<void(std::size_t)>& done);

@@ -29,7 +29,7 @@ DeviceArray checked(DeviceArray array) {
 }
 
 /// What surfaces may be made of.
-struct Samples {
+struct SamplesOnDevice {
   Box3 region;
   int level = 0;
   Inside inside = Inside::above;
@@ -64,7 +64,7 @@ struct Samples {
 
 struct DeviceExtractor::Impl {
   std::unique_ptr<gpu::CachedExtractor> extractor;
-  Samples samples;
+  SamplesOnDevice samples;
 
   explicit Impl(const DeviceArray& array)
       : extractor(std::make_unique<gpu::CachedExtractor>(checked(array))),
