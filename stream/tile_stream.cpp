@@ -12,6 +12,7 @@ namespace {
 
 constexpr Index kTileBlocks = kTileEdge / kBlockEdge;
 constexpr Index kChunkTiles = StoreReader::kRangeChunk / kTileBlocks;
+static_assert((kChunkTiles & (kChunkTiles - 1)) == 0, "ranges of tiles need a power of two");
 
 void append_needed_bricks(const Lattice& lattice, const TileWork& work, Index reach,
                           std::vector<Int3>& bricks) {
@@ -56,11 +57,19 @@ TileStream::TileStream(std::vector<TileWork> tiles) : isovalues_(1), tiles_(std:
   for (const TileWork& work : tiles_) blocks_.push_back(work.active_blocks);
 }
 
+void TileStream::restrict_to(const TileRange& range) {
+  range_ = range;
+  std::erase_if(chunks_, [&](Int3 chunk) { return !range.needs(chunk, kChunkTiles); });
+}
+
 bool TileStream::load_next_chunk() {
   if (next_chunk_ == chunks_.size()) return false;
   const Stopwatch watch(seconds_);
   for (std::vector<TileWork>& tiles : tiles_of_) tiles.clear();
   search_->append_tiles(chunks_[next_chunk_++], roi_tiles_, isovalues_, tiles_of_);
+  if (range_ != TileRange{})
+    for (std::vector<TileWork>& tiles : tiles_of_)
+      std::erase_if(tiles, [&](const TileWork& work) { return !range_.needs(work.tile); });
   merge();
   return true;
 }

@@ -8,6 +8,7 @@
 
 #include <isobrick/store_reader.h>
 #include "core/tile.h"
+#include "core/tile_range.h"
 #include "stream/block_search.h"
 
 namespace isobrick::inline v0 {
@@ -28,6 +29,10 @@ class TileStream {
   TileStream(std::unique_ptr<BlockSearch> search, const Lattice& lattice, Box3 tiles);
   /// These tiles, as if they were active at one isovalue.
   explicit TileStream(std::vector<TileWork> tiles);
+
+  /// From now on only tiles that the mesh of this range needs. Called before anything is looked
+  /// for.
+  void restrict_to(const TileRange& range);
 
   /// Looks for the first tiles in one range chunk, so that next() need not; where it has none,
   /// next() goes on.
@@ -54,6 +59,7 @@ class TileStream {
   std::vector<double> isovalues_;
   double seconds_ = 0;
   Box3 roi_tiles_;
+  TileRange range_;
   std::vector<Int3> chunks_;  ///< range chunks in Morton order
   std::size_t next_chunk_ = 0;
   std::vector<std::vector<TileWork>> tiles_of_;  ///< of the chunk at hand, for each isovalue

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include <isobrick/error.h>
+#include "core/morton.h"
 #include "core/stopwatch.h"
 #include "surface/boundary_map.h"
 #include "surface/cap.h"
@@ -60,6 +61,9 @@ struct CpuExtractor::Impl {
   Mesh mesh;  ///< not handed on
   SurfaceReport made;
   std::optional<ChunkWriter> writer;
+  TileRange part;
+  TilePlaces* places = nullptr;  ///< of a part of a mesh
+  MeshSize before;               ///< of the tiles before the part
 
   Impl(const Lattice& l, const SurfaceOptions& o, ExtractorLimits bounds, MeshSink* sink,
        std::shared_ptr<TileWorkSpaces> work_spaces)
@@ -157,6 +161,21 @@ struct CpuExtractor::Impl {
       tbb::parallel_for(begin, end, f, tbb::simple_partitioner());
   }
 
+  void note_place(const TileState& state) {
+    if (!places) return;
+    const std::uint32_t left_out = state.coincident ? state.coincident->left_out : 0;
+    if (state.vertices > 0 || state.triangles > 0 || left_out > 0)
+      places->place({morton_encode(state.work.tile), state.number_base, state.vertices,
+                     state.triangles, left_out});
+  }
+
+  void check_numbers() const {
+    if (welded() && made.vertices > std::numeric_limits<std::uint32_t>::max())
+      throw Error(
+          "the mesh has more than 4294967295 vertices, which an indexed mesh of 32 bits "
+          "cannot number; extract it in parts with --roi, or as STL");
+  }
+
   /// Gives the counted tiles from `begin` on their places in the mesh, as many as
   /// the limits allow; the first that did not fit.
   std::size_t place(std::size_t begin, std::size_t count) {
@@ -177,11 +196,9 @@ struct CpuExtractor::Impl {
       made.vertices += state.vertices;
       made.triangles += state.triangles;
       if (state.coincident) made.degenerate_triangles += state.coincident->left_out;
+      note_place(state);
     }
-    if (welded() && made.vertices > std::numeric_limits<std::uint32_t>::max())
-      throw Error(
-          "the mesh has more than 4294967295 vertices, which an indexed mesh of 32 bits "
-          "cannot number; extract it in parts with --roi, or as STL");
+    check_numbers();
     return i;
   }
 
@@ -201,12 +218,32 @@ struct CpuExtractor::Impl {
     mesh.triangles.resize(last.triangle_base + last.triangles);
   }
 
-  void extract_batch(std::span<const TileWork> tiles, const TileSamples& samples) {
+  void count_batch(std::span<const TileWork> tiles, const TileSamples& samples) {
     const std::size_t n = tiles.size();
     while (states.size() < n) states.push_back(std::make_unique<TileState>());
     for (std::size_t i = 0; i < n; ++i)
       states[i]->boundary = welded() ? boundaries.add(tiles[i].tile) : nullptr;
     for_each_tile(0, n, [&](std::size_t i) { count(*states[i], tiles[i], samples); });
+  }
+
+  /// Numbers the vertices of tiles before the part.
+  void number_batch(std::span<const TileWork> tiles, const TileSamples& samples) {
+    count_batch(tiles, samples);
+    for (std::size_t i = 0; i < tiles.size(); ++i) {
+      TileState& state = *states[i];
+      state.number_base = static_cast<std::uint32_t>(made.vertices);
+      state.boundary->base = state.number_base;
+      made.vertices += state.vertices;
+      before.vertices += state.vertices;
+      note_place(state);
+    }
+    check_numbers();
+    boundaries.forget_before(tiles.back().tile);
+  }
+
+  void extract_batch(std::span<const TileWork> tiles, const TileSamples& samples) {
+    const std::size_t n = tiles.size();
+    count_batch(tiles, samples);
     for (std::size_t begin = 0; begin < n;) {
       const std::size_t end = place(begin, n);
       if (end > begin) {
@@ -224,14 +261,25 @@ struct CpuExtractor::Impl {
       writer->write(mesh, made.vertices - mesh.positions.size());
   }
 
-  void extract(std::span<const TileWork> tiles, const TileSamples& samples) {
+  /// Calls f(batch) for `tiles` in batches of one size: a small last one would keep few threads
+  /// busy.
+  template <class F>
+  void for_each_batch(std::span<const TileWork> tiles, const F& f) const {
     while (!tiles.empty()) {
-      // Parts of one size: a small last one would keep few threads busy.
       const std::size_t parts = (tiles.size() + limits.tiles - 1) / limits.tiles;
       const std::size_t batch = (tiles.size() + parts - 1) / parts;
-      extract_batch(tiles.first(batch), samples);
+      f(tiles.first(batch));
       tiles = tiles.subspan(batch);
     }
+  }
+
+  void extract(std::span<const TileWork> tiles, const TileSamples& samples) {
+    const auto own = std::find_if(tiles.begin(), tiles.end(), [&](const TileWork& work) {
+      return !places || part.contains(work.tile);
+    });
+    const auto others = static_cast<std::size_t>(own - tiles.begin());
+    for_each_batch(tiles.first(others), [&](auto batch) { number_batch(batch, samples); });
+    for_each_batch(tiles.subspan(others), [&](auto batch) { extract_batch(batch, samples); });
     if (writer) hand_on();
   }
 };
@@ -252,12 +300,18 @@ void CpuExtractor::extract(std::span<const TileWork> tiles, const TileSamples& s
   impl_->extract(tiles, samples);
 }
 
+void CpuExtractor::make_part(const TileRange& part, TilePlaces& places) {
+  impl_->part = part;
+  impl_->places = &places;
+}
+
 void CpuExtractor::finish() {
   if (impl_->writer) impl_->writer->finish();
 }
 
 SurfaceReport CpuExtractor::report() const {
   SurfaceReport report = impl_->made;
+  report.vertices -= impl_->before.vertices;
   if (impl_->writer) report.sink = impl_->writer->report();
   report.surface.bytes = report.sink.bytes;
   return report;
@@ -282,6 +336,7 @@ void CpuExtractor::restart() {
   impl_->boundaries.clear();
   impl_->mesh.clear();
   impl_->made = {};
+  impl_->before = {};
 }
 
 std::size_t CpuExtractor::preferred_batch(int threads) {

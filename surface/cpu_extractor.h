@@ -7,6 +7,7 @@
 
 #include "surface/cap_bounds.h"
 #include "surface/surface_extractor.h"
+#include "surface/tile_places.h"
 
 namespace isobrick::inline v0 {
 
@@ -51,6 +52,12 @@ class CpuExtractor final : public SurfaceExtractor {
   CpuExtractor(const Lattice& lattice, const SurfaceOptions& options, ExtractorLimits limits,
                MeshSink* sink = nullptr, std::shared_ptr<TileWorkSpaces> spaces = nullptr);
   ~CpuExtractor() override;
+
+  /// From now on makes the mesh of a part only, before the first tile: tiles before the part are
+  /// counted, so that their vertices have numbers, but not written. `places`, which must outlive
+  /// it, hears of all tiles with vertices or triangles, also left out, in order. Only of a welded
+  /// mesh.
+  void make_part(const TileRange& part, TilePlaces& places);
 
   /// Needs no samples any more when it returns.
   void extract(std::span<const TileWork> tiles, const BrickLookup& bricks,

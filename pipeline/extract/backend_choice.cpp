@@ -34,7 +34,7 @@ std::size_t plan_gpu_pass(PassRequests requests, const ExtractOptions& options,
 
 bool use_cuda(const ExtractRequest& request, const ExtractOptions& options,
               std::uint64_t active_blocks) {
-  if (options.backend == Backend::cpu) return false;
+  if (options.backend == Backend::cpu || request.part) return false;
   const bool must = options.backend == Backend::cuda;
   const auto why = gpu::why_unsupported(request.surface);
   if (must && why) throw UsageError("--backend cuda: " + *why);
@@ -83,9 +83,12 @@ ChosenBackend set_up_backend(PassRequests requests, const ExtractOptions& option
   const std::size_t count = surfaces_of_pass(requests, options.memory, other_bytes);
   chosen.plan = plan_memory(requests.first(count), options.memory, other_bytes);
   const auto spaces = std::make_shared<TileWorkSpaces>();
-  for (std::size_t i = 0; i < count; ++i)
-    chosen.surfaces.push_back(std::make_unique<CpuExtractor>(
-        requests[i].level->lattice, requests[i].surface, chosen.plan.limits, sinks[i], spaces));
+  for (std::size_t i = 0; i < count; ++i) {
+    auto surface = std::make_unique<CpuExtractor>(requests[i].level->lattice, requests[i].surface,
+                                                  chosen.plan.limits, sinks[i], spaces);
+    if (const auto& part = requests[i].part) surface->make_part(part->tiles, *part->places);
+    chosen.surfaces.push_back(std::move(surface));
+  }
   return chosen;
 }
 

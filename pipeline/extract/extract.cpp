@@ -11,6 +11,7 @@
 #include "core/cancellable_progress.h"
 #include "core/stopwatch.h"
 #include "pipeline/extract/backend_choice.h"
+#include "pipeline/extract/extract_part.h"
 #include "pipeline/extract/extract_pass.h"
 #include "pipeline/extract/extract_plan.h"
 #include "pipeline/extract/extract_tiles.h"
@@ -46,13 +47,14 @@ EarlyWork begin_early(const StoreReader& store, const ExtractOptions& options,
 class Extraction {
  public:
   Extraction(const StoreReader& store, const ExtractOptions& options,
-             std::span<const SurfaceOutput> outputs)
+             std::span<const SurfaceOutput> outputs, const std::optional<RequestedPart>& part = {})
       : store_(store), options_(options), reports_(outputs.size()) {
     for (const SurfaceOutput& output : outputs) {
       options_.isovalue = output.isovalue;
       options_.normals = output.normals;
       requests_.push_back(check_request(store, options_, output.sink->indexing()));
       requests_.back().sink_bytes = output.sink->memory();
+      requests_.back().part = part;
       sinks_.push_back(output.sink);
     }
     other_bytes_ =
@@ -66,7 +68,7 @@ class Extraction {
       begin();
     }
     std::uint64_t bytes = 0;
-    for (const ExtractRequest& request : requests_) bytes += active_bytes(request);
+    for (std::size_t i = 0; i < requests_.size(); ++i) bytes += active_bytes(i);
     progress.begin("extracting", bytes);
     std::size_t made = 0;
     for (std::size_t pass = 0; made < requests_.size(); ++pass) {
@@ -82,8 +84,18 @@ class Extraction {
   }
 
  private:
-  static std::uint64_t active_bytes(const ExtractRequest& request) {
-    return request.active_bricks * request.level->lattice.brick_bytes();
+  /// Of a surface's active bricks, what lies in so many active blocks.
+  std::uint64_t bytes_of_blocks(std::uint64_t blocks, std::size_t surface) const {
+    const ExtractRequest& request = requests_[surface];
+    const std::uint64_t all = request.active_bricks * request.level->lattice.brick_bytes();
+    const std::uint64_t of = std::max<std::uint64_t>(1, active_[surface].active_blocks);
+    return static_cast<std::uint64_t>(static_cast<double>(blocks) / static_cast<double>(of) *
+                                      static_cast<double>(all));
+  }
+
+  std::uint64_t active_bytes(std::size_t surface) const {
+    const auto& part = requests_[surface].part;
+    return bytes_of_blocks(part ? part->active_blocks : active_[surface].active_blocks, surface);
   }
 
   /// Counts what is active, and refuses a budget that is too small for any of the surfaces.
@@ -185,12 +197,12 @@ class Extraction {
 
   /// Of a surface's active bricks, the part that lies in these tiles.
   std::uint64_t bytes_of(std::span<const TileWork> tiles, std::size_t surface) const {
-    double blocks = 0;
+    const auto& part = requests_[surface].part;
+    std::uint64_t blocks = 0;
     for (const TileWork& tile : tiles)
-      blocks += static_cast<double>(std::popcount(tile.active_blocks));
-    const double all = std::max(1.0, static_cast<double>(active_[surface].active_blocks));
-    return static_cast<std::uint64_t>(blocks / all *
-                                      static_cast<double>(active_bytes(requests_[surface])));
+      if (!part || part->tiles.contains(tile.tile))
+        blocks += static_cast<std::uint64_t>(std::popcount(tile.active_blocks));
+    return bytes_of_blocks(blocks, surface);
   }
 
   /// Adds to the reports of a pass what is known of its surfaces and what the store counted.
@@ -238,6 +250,13 @@ std::string_view bound_of(const ExtractReport& report) {
              stages.begin(), stages.end(),
              [](const auto& a, const auto& b) { return a.second.seconds < b.second.seconds; })
       ->first;
+}
+
+ExtractReport extract_part(const StoreReader& store, const ExtractOptions& options,
+                           const RequestedPart& part, MeshSink& sink, Progress& progress) {
+  CancellableProgress cancellable(progress, options.cancel);
+  const SurfaceOutput output{options.isovalue, options.normals, &sink};
+  return Extraction(store, options, {&output, 1}, part).run(cancellable).front();
 }
 
 std::uint64_t min_extract_memory(const StoreReader& store, const ExtractOptions& options,

@@ -22,6 +22,13 @@ struct ExtractPlan {
   std::uint64_t bytes = 0;       ///< all of it, the program itself included
 };
 
+/// A part of a mesh that is made alone.
+struct RequestedPart {
+  TileRange tiles;
+  TilePlaces* places = nullptr;     ///< hears where its tiles lie
+  std::uint64_t active_blocks = 0;  ///< of its own tiles
+};
+
 /// The options for the store's level, checked.
 struct ExtractRequest {
   const LevelInfo* level = nullptr;
@@ -33,6 +40,7 @@ struct ExtractRequest {
   std::uint64_t memory_of_others = 0;  ///< see ExtractOptions
   std::uint64_t sink_bytes = 0;        ///< MeshSink::memory() of its sink
   std::uint64_t active_bricks = 0;     ///< bounds what a cache can use
+  std::optional<RequestedPart> part;   ///< nothing: the whole mesh
 };
 
 /// Throws UsageError for a level, region or isovalue that makes no sense, and for

@@ -11,12 +11,10 @@ namespace isobrick::inline v0 {
 /// The tiles that are active at any of a pass's isovalues_of(). `store` must outlive them.
 inline TileStream tiles_of(const StoreReader& store, int level, PassRequests requests) {
   const ExtractRequest& common = requests.front();
-  return {store,
-          level,
-          isovalues_of(requests),
-          common.surface.roi,
-          common.search,
-          cap_search(common.surface)};
+  TileStream tiles(store, level, isovalues_of(requests), common.surface.roi, common.search,
+                   cap_search(common.surface));
+  if (common.part) tiles.restrict_to(common.part->tiles);
+  return tiles;
 }
 
 /// The same in batches as planned.
