@@ -116,8 +116,8 @@ class MeshFilter::Stages {
   Stages(MeshSink& sink, const MeshFilterOptions& options)
       : place_{.beside = options.scratch_beside.string()}, cancel_(options.cancel), first_(&sink) {
     check_filters(options);
-    const bool unwelds =
-        (options.changes_mesh() || options.measure) && sink.indexing() == Indexing::chunk_local;
+    const bool takes_welded = options.changes_mesh() || options.measure || options.takes_welded;
+    const bool unwelds = takes_welded && sink.indexing() == Indexing::chunk_local;
     const int shares = int{unwelds} + int{options.measure} + int{options.smooth > 0} +
                        int{options.simplifies()} + int{chooses_components(options)};
     memory_ = options.memory / static_cast<std::uint64_t>(std::max(1, shares));

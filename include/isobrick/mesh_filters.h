@@ -63,7 +63,9 @@ struct MeshFilterOptions {
   /// measures in the unit after.
   std::string unit = {};
   bool measure = false;  ///< MeshFilter::measure()
-  int threads = 0;       ///< of simplification, 0: all cores; never shows in the mesh
+  /// Takes a welded mesh for any sink, also where there is nothing to do.
+  bool takes_welded = false;
+  int threads = 0;  ///< of simplification, 0: all cores; never shows in the mesh
   /// Bytes that all filters hold at most; what does not fit lies in scratch files. Simplification
   /// takes 120 MiB more for the groups that it works on.
   std::uint64_t memory = std::uint64_t{256} << 20;
@@ -104,7 +106,7 @@ class ISOBRICK_API MeshFilter final : public MeshSink {
   MeshFilter(MeshSink& sink, const MeshFilterOptions& options);
   ~MeshFilter() override;
 
-  /// Welded, but that of the sink where there is nothing to do.
+  /// Welded, but that of the sink where there is nothing to do and `takes_welded` is not set.
   Indexing indexing() const override;
   void begin(const MeshHeader& header) override;
   /// Throws Error for a mesh of more than 2³² − 1 vertices.
