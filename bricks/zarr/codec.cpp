@@ -100,10 +100,10 @@ std::string CodecChain::name() const {
   return "none";
 }
 
-std::uint32_t crc32c(std::span<const std::byte> bytes) {
+std::uint32_t crc32c(std::span<const std::byte> bytes, std::uint32_t before) {
   // ISA-L takes the length as an int and neither inverts its argument nor its result.
   constexpr std::size_t kStep = std::size_t{1} << 30;
-  std::uint32_t state = ~std::uint32_t{0};
+  std::uint32_t state = ~before;
   for (std::size_t done = 0; done < bytes.size(); done += kStep) {
     const auto part = bytes.subspan(done, std::min(kStep, bytes.size() - done));
     auto* data = const_cast<unsigned char*>(reinterpret_cast<const unsigned char*>(part.data()));

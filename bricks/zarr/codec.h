@@ -36,8 +36,8 @@ struct CodecChain {
   std::string name() const;
 };
 
-/// CRC-32C (Castagnoli) as Zarr stores it.
-std::uint32_t crc32c(std::span<const std::byte> bytes);
+/// CRC-32C (Castagnoli) as Zarr stores it. `before` is that of the bytes before these.
+std::uint32_t crc32c(std::span<const std::byte> bytes, std::uint32_t before = 0);
 
 /// What lies before the CRC-32C at the end. Throws DamageError where that is another.
 std::span<const std::byte> without_checksum(std::span<const std::byte> encoded);

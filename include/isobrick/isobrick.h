@@ -19,6 +19,8 @@
 #include <isobrick/mesh_sinks.h>
 #include <isobrick/open_source.h>
 #include <isobrick/open_volume.h>
+#include <isobrick/part.h>
+#include <isobrick/pieces.h>
 #include <isobrick/progress.h>
 #include <isobrick/store_reader.h>
 #include <isobrick/synth_source.h>

@@ -44,7 +44,7 @@ const std::map<std::string, Names> kMayInclude = {
 /// The room that each public header belongs to.
 const std::map<std::string, Names> kPublicHeaders = {
     {"core",
-     {"api", "downsampling", "error", "inside", "label_properties", "lattice", "pod_buffer",
+     {"api", "downsampling", "error", "inside", "label_properties", "lattice", "pod_buffer", "part",
       "progress", "range", "scalar", "selection", "transform", "vec", "version"}},
     {"io/volumes", {"array_view", "volume_request", "volume_source"}},
     {"io/volumes/open", {"open_source"}},
@@ -66,6 +66,7 @@ const std::map<std::string, Names> kPublicHeaders = {
     {"pipeline/extract", {"estimate", "extract", "index_choice"}},
     {"pipeline/index", {"index_build"}},
     {"pipeline/labels", {"labels"}},
+    {"pipeline/pieces", {"pieces"}},
     {"pipeline/sample", {"attributes"}},
     {"pipeline/verify", {"verify"}},
     {"pipeline/volume", {"device_extractor", "volume", "volume_extractor"}},

@@ -1,0 +1,85 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include <nlohmann/json.hpp>
+
+#include <isobrick/mesh.h>
+#include <isobrick/part.h>
+#include "core/tile_range.h"
+
+// The bytes of a piece of a mesh; docs/reference/piece_format.md describes them. No files here.
+
+namespace isobrick::inline v0 {
+
+/// What a piece begins with.
+struct PieceHeader {
+  Part part;
+  TileRange tiles;      ///< whose mesh it holds
+  nlohmann::json mesh;  ///< whose part it is: samples and options
+  MeshHeader of_mesh;   ///< of the whole mesh
+
+  Int3 extent() const;  ///< samples of the volume
+  double isovalue() const;
+};
+
+/// Before the header's text.
+struct PieceStart {
+  static constexpr std::uint64_t kMagic = 0x65636569706f7369;  // "isopiece"
+  static constexpr std::uint32_t kVersion = 1;
+  std::uint64_t magic = kMagic;
+  std::uint32_t version = kVersion;
+  std::uint32_t header_bytes = 0;
+};
+
+/// Of a tile: before its positions, normals and triangles. Of tiles before the part, whose vertices
+/// have the first numbers: alone.
+struct PieceTile {
+  std::uint64_t code = 0;  ///< morton_encode() of the tile
+  std::uint32_t vertices = 0;
+  std::uint32_t triangles = 0;
+};
+
+/// What a piece ends with.
+struct PieceEnd {
+  static constexpr std::uint64_t kMagic = 0x646e656563656970;  // "pieceend"
+  std::uint64_t neighbours = 0;  ///< tiles before the part that are listed
+  std::uint64_t tiles = 0;       ///< of the part
+  std::uint64_t vertices = 0;
+  std::uint64_t triangles = 0;
+  std::uint64_t degenerate = 0;    ///< triangles left out
+  std::uint64_t largest_tile = 0;  ///< bytes of the largest tile's positions, normals, triangles
+  std::uint64_t bytes = 0;         ///< of the whole file
+  std::uint64_t magic = kMagic;
+  std::uint32_t content_crc32c = 0;  ///< of all bytes before these
+  std::uint32_t own_crc32c = 0;      ///< of these, but for itself
+};
+
+/// What one tile can have at most, whatever the options: three edges a sample, three vertices
+/// within each cell and one on each sample; 16 triangles a cell and two at most on each border
+/// face.
+inline constexpr std::uint32_t kMaxTileVertices = 1 << 18;
+inline constexpr std::uint32_t kMaxTileTriangles = 1 << 20;
+
+/// Bytes of a tile behind its PieceTile.
+std::uint64_t content_bytes(const PieceTile& tile, bool normals);
+
+/// The text of a header: one for each header.
+std::string to_text(const PieceHeader& header);
+/// Nothing for a text that is none.
+std::optional<PieceHeader> parse_piece_header(std::string_view text);
+
+/// Where the members of two `PieceHeader::mesh` differ: words for a message such as "isovalue (1
+/// and 2)"; empty where they are equal.
+std::string difference(const nlohmann::json& mesh, const nlohmann::json& other);
+
+/// "2 of 8".
+std::string part_text(Part part);
+
+/// Throws UsageError for a part that there is not.
+void check_part(Part part);
+
+}  // namespace isobrick
