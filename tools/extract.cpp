@@ -11,6 +11,7 @@
 #include "bricks/zarr/metadata_files.h"
 #include "io/bytes/output_guard.h"
 #include "tools/extract_labels.h"
+#include "tools/extract_part.h"
 #include "tools/extract_plan.h"
 #include "tools/output_name.h"
 #include "tools/value_range.h"
@@ -213,6 +214,7 @@ void note_band(double isovalue, const StoreInfo& info, Console& console) {
 }
 
 int run_extract(const ExtractArguments& given, Console& console) {
+  if (given.part) return run_extract_part(given, console);
   if (given.labels) return run_extract_labels(given, console);
   ExtractArguments arguments = with_preset(given);
   check_arguments(arguments);
@@ -330,6 +332,11 @@ void add_extract(Program& program) {
        "In place of isosurfaces, a closed mesh of each label of a segmentation, in the folder -o: "
        "of all but 0, or of these, such as 3,7,10:20"});
   add_outputs(app, *arguments);
+  add_parsed(app, arguments->part,
+             [](const std::string& text) { return std::optional(parse_part(text)); },
+             {"--part", "I/N",
+              "Make part I of N of the mesh, a piece that 'isobrick merge' puts together with the "
+              "others; one that is there is kept"});
   add_level_options(app, *arguments);
   add_region(app, arguments->region);
   add_inside(app, arguments->inside);

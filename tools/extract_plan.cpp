@@ -346,20 +346,23 @@ ExtractEstimate estimate_one(const ExtractedSurface& surface, const StoreReader&
           mesh_file_memory(surface.form.format, surface.options.threads, surface.options.memory));
 }
 
-/// Refuses meshes that cannot fit their disk, before anything is written.
-void check_space(const std::vector<ExtractedSurface>& surfaces, const StoreReader& store) {
+void check_space(const std::vector<ExtractedSurface>& surfaces, const StoreReader& store,
+                 std::uint64_t parts) {
+  const auto part_of = [&](MeshSize mesh) {
+    return MeshSize{mesh.vertices / parts, mesh.triangles / parts};
+  };
   // Mostly all that the active cells could hold fits, which is known without a sample.
   std::vector<double> isovalues;
   for (const ExtractedSurface& surface : surfaces) isovalues.push_back(surface.options.isovalue);
   const std::vector<ActiveParts> active = count_active(store, surfaces.front().options, isovalues);
   const auto largest = planned_meshes(surfaces, [&](std::size_t i) {
-    return PlannedMesh{
-        .size = largest_mesh(active[i], surfaces[i].options.topology, surfaces[i].options.cap)};
+    return PlannedMesh{.size = part_of(largest_mesh(active[i], surfaces[i].options.topology,
+                                                    surfaces[i].options.cap))};
   });
   if (!find_shortage(largest, free_space)) return;
   const auto likely = planned_meshes(surfaces, [&](std::size_t i) {
     const ExtractEstimate guess = estimate_one(surfaces[i], store);
-    return PlannedMesh{.size = guess.mesh, .uncertainty = guess.uncertainty};
+    return PlannedMesh{.size = part_of(guess.mesh), .uncertainty = guess.uncertainty};
   });
   if (const auto shortage = find_shortage(likely, free_space))
     throw Error(shortage_text(likely[shortage->mesh], *shortage,

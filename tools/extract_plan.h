@@ -6,6 +6,7 @@
 #include <vector>
 
 #include <isobrick/labels.h>
+#include <isobrick/part.h>
 #include <isobrick/store_reader.h>
 #include "tools/attribute_option.h"
 #include "tools/extract_report.h"
@@ -21,7 +22,8 @@ struct ExtractArguments {
   InputArguments input;
   std::vector<IsovalueRequest> isovalues;
   std::optional<std::vector<LabelRange>> labels;  ///< in place of isovalues; none: all of them
-  std::string output;  ///< empty: by the input's name, unless nothing is to be written
+  std::string output;        ///< empty: by the input's name, unless nothing is to be written
+  std::optional<Part> part;  ///< of the mesh, which becomes a piece; nothing: all of it
   PreviewRequest preview;
   std::optional<MeshFormat> format;  ///< of the output; nothing: by its name
   bool quantize = false;
@@ -78,8 +80,9 @@ std::uint64_t memory_of_mesh(const ExtractedSurface& surface, std::size_t surfac
 
 ExtractEstimate estimate_one(const ExtractedSurface& surface, const StoreReader& store);
 
-/// Refuses meshes that cannot fit their disk, before anything is written.
-void check_space(const std::vector<ExtractedSurface>& surfaces, const StoreReader& store);
+/// Refuses meshes that cannot fit their disk, or equal parts of them, before anything is written.
+void check_space(const std::vector<ExtractedSurface>& surfaces, const StoreReader& store,
+                 std::uint64_t parts = 1);
 
 /// Refuses a budget in which pictures cannot be drawn, before anything is extracted.
 void check_pictures(const std::vector<ExtractedSurface>& surfaces,

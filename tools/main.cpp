@@ -31,6 +31,7 @@ void define(Program& program) {
   add_index(program);
   add_verify(program);
   add_extract(program);
+  add_merge(program);
   add_export(program);
   add_render(program);
   add_view(program);

@@ -39,6 +39,7 @@ void add_info(Program& program);
 void add_index(Program& program);
 void add_verify(Program& program);
 void add_extract(Program& program);
+void add_merge(Program& program);
 void add_export(Program& program);
 void add_synth(Program& program);
 void add_render(Program& program);

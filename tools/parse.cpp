@@ -140,6 +140,17 @@ PictureSize parse_picture_size(std::string_view text) {
           parse_int(text.substr(by + 1), kMinPictureEdge, kMaxPictureEdge)};
 }
 
+Part parse_part(std::string_view text) {
+  const std::size_t slash = text.find('/');
+  if (slash == text.npos)
+    throw UsageError(fmt::format("'{}' is no part; write it I/N, such as 3/8", text));
+  Part part;
+  part.count = static_cast<std::uint32_t>(parse_int(text.substr(slash + 1), 1, kMaxParts));
+  part.number =
+      static_cast<std::uint32_t>(parse_int(text.substr(0, slash), 1, static_cast<int>(part.count)));
+  return part;
+}
+
 Vec3f parse_colour(std::string_view text) {
   constexpr std::string_view digits = "0123456789abcdef";
   if (text == "white") return {1, 1, 1};

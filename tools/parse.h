@@ -10,6 +10,7 @@
 #include <isobrick/downsampling.h>
 #include <isobrick/extract.h>
 #include <isobrick/open_source.h>
+#include <isobrick/part.h>
 #include <isobrick/scalar.h>
 #include <isobrick/vec.h>
 #include "core/half_space.h"
@@ -62,6 +63,9 @@ PictureSize parse_picture_size(std::string_view text);
 
 /// "auto", "cpu" or "cuda".
 Backend parse_backend(std::string_view text);
+
+/// "I/N": part I of N.
+Part parse_part(std::string_view text);
 
 /// "above" or "below".
 Inside parse_inside(std::string_view text);

@@ -101,6 +101,13 @@ def run_commands(check):
     for output in ("e.ply", "e.stl"):
         check.run("extract_estimate", "extract", "a.zarr", "--isovalue", "128", "--estimate",
                   "-o", output)
+    check.run("extract_part", "extract", "a.zarr", "--isovalue", "128", "--part", "1/1",
+              "--drop-degenerate", "-o", "a.piece")
+    check.run("extract_part", "extract", "a.zarr", "--isovalue", "128", "--part", "1/1",
+              "--drop-degenerate", "-o", "a.piece")
+    for options in ([], ["--simplify", "50%", "--measure"]):
+        check.run("merge", "merge", "a.piece", "-o", "p.ply", "--force", *options)
+    check.run("merge", "merge", "a.piece", "-o", "p.stl")
     check.run("synth", "synth", "cells", "cells.zarr", "--dims", "30,30,30", "--type", "u8")
     check.run("extract_labels", "extract", "cells.zarr", "--labels", "all", "-o", "meshes",
               "--measure")

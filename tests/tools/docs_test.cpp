@@ -83,6 +83,7 @@ class Docs : public ProgramTest {
                        line.find("--preview") != std::string::npos;
     if (draws && !has_pictures_) return true;
     if (line.find("man -l") != std::string::npos && !available("man")) return true;
+    if (line.starts_with("parallel ") && !available("parallel")) return true;
     // There is no display here.
     if (line.starts_with("isobrick view ") && line.find(" --screenshot") == std::string::npos &&
         line.find(" --turntable") == std::string::npos)
@@ -137,8 +138,8 @@ TEST_F(Docs, LinesOfTheReadmeRun) {
 TEST_F(Docs, ExamplesOfHelpRun) {
   unpack("head.raw");
   unpack("head_64x64x93_int16.raw");
-  for (const char* command : {"convert", "info", "index", "verify", "extract", "export", "render",
-                              "view", "synth", "completion", "man", "help"}) {
+  for (const char* command : {"convert", "info", "index", "verify", "extract", "merge", "export",
+                              "render", "view", "synth", "completion", "man", "help"}) {
     const std::string help = run({"help", command}).out;
     int examples = 0;
     const auto begin = help.find("Example:\n");

@@ -1,0 +1,218 @@
+#include "tools/merge.h"
+
+#include <algorithm>
+#include <regex>
+
+#include <fmt/format.h>
+
+#include <isobrick/error.h>
+#include "core/stopwatch.h"
+#include "io/bytes/folder_walk.h"
+#include "io/bytes/leftovers.h"
+#include "io/bytes/output_guard.h"
+#include "io/meshes/levels/level_sink.h"
+#include "tools/extract_report.h"
+#include "tools/format.h"
+#include "tools/measure_report.h"
+#include "tools/mesh_space.h"
+#include "tools/output_name.h"
+
+namespace isobrick::tools {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::ordered_json;
+
+struct MergeArguments {
+  std::vector<std::string> pieces;
+  std::string output;  ///< empty: by the name of the first piece
+  std::optional<MeshFormat> format;
+  bool quantize = false;
+  int levels = 0;
+  bool sharded = false;
+  FilterArguments filters;
+  std::uint64_t memory = 0;
+  int threads = 0;
+  bool force = false, no_space_check = false;
+};
+
+/// "head_500.ply" of "head_500_3of8.piece", in the current folder.
+fs::path default_output(const std::string& piece, MeshFormat format) {
+  const std::string stem = fs::path(piece).stem().string();
+  return std::regex_replace(stem, std::regex("_[0-9]+of[0-9]+$"), "") +
+         std::string(isobrick::extension_of(format));
+}
+
+MeshForm form_of(const MergeArguments& arguments) {
+  MeshForm form{
+      .quantize = arguments.quantize, .levels = arguments.levels, .sharded = arguments.sharded};
+  if (arguments.format)
+    form.format = *arguments.format;
+  else if (!arguments.output.empty())
+    form.format = mesh_format(arguments.output);
+  if (!arguments.output.empty()) check_mesh_name(arguments.output, form.format);
+  if (form.quantize && form.format != MeshFormat::glb)
+    throw UsageError(
+        fmt::format("--quantize is for GLB only, and this mesh becomes {}", name_of(form.format)));
+  check_levels(form);
+  return form;
+}
+
+/// Refuses a mesh that cannot fit its disk.
+void check_disk(const MergeJob& job, const PiecesInfo& info) {
+  const bool streams = is_standard_output(job.output.native());
+  if (job.no_space_check || (streams && job.form.format == MeshFormat::obj)) return;
+  const fs::path path = streams ? temporary_folder() / "isobrick" : job.output;
+  const PlannedMesh mesh{.path = path, .form = job.form, .size = info.size, .filter = job.filter};
+  if (const auto shortage = find_shortage({&mesh, 1}, free_space))
+    throw Error(fmt::format(
+        "'{}' will have {} triangles and need {}, but {} has {} free; choose another disk (or "
+        "--no-space-check)",
+        job.output.string(), human_count(info.size.triangles), human_bytes(shortage->needed),
+        streams ? "the disk of temporary files" : "its disk", human_bytes(shortage->free)));
+}
+
+/// Filters get half of what the pieces and the file do not need.
+std::uint64_t filter_memory(const MergeJob& job, const PiecesInfo& info, std::uint64_t of_file) {
+  constexpr std::uint64_t least = std::uint64_t{8} << 20;
+  const std::uint64_t needed = info.merge_memory + of_file + least;
+  return least + (job.memory - std::min(job.memory, needed)) / 2;
+}
+
+/// The mesh with what it goes through.
+struct MergeSinks {
+  std::unique_ptr<MeshSink> file;
+  std::unique_ptr<MeshFilter> filter;
+};
+
+MergeSinks open_sinks(const MergeJob& job, const PiecesInfo& info, Progress& progress) {
+  MergeSinks sinks;
+  sinks.file = create_mesh_file(job.output, {.format = job.form.format,
+                                             .quantize = job.form.quantize,
+                                             .levels = job.form.levels,
+                                             .sharded = job.form.sharded,
+                                             .force = job.force,
+                                             .threads = job.threads,
+                                             .memory = job.memory,
+                                             .progress = &progress});
+  MeshFilterOptions filter = job.filter;
+  filter.takes_welded = true;
+  filter.threads = job.threads;
+  filter.scratch_beside = job.output;
+  filter.progress = &progress;
+  filter.memory = filter_memory(job, info, sinks.file->memory());
+  sinks.filter = std::make_unique<MeshFilter>(*sinks.file, filter);
+  return sinks;
+}
+
+ordered_json merge_json(const MergeJob& job, const PiecesInfo& info, const MergeSinks& sinks,
+                        std::uint64_t bytes, double seconds) {
+  const MeshSize size = sinks.filter->size();
+  ordered_json object{
+      {"pieces", job.pieces.size()},
+      {"isovalue", info.isovalue},
+      {"output", job.output.string()},
+      {"output_bytes", bytes},
+      {"triangles", size.triangles},
+      {"vertices", has_vertices(job.form.format) ? ordered_json(size.vertices) : ordered_json()},
+      {"degenerate_triangles", info.degenerate},
+      {"seconds", seconds}};
+  if (job.filter.changes_mesh())
+    object["extracted"] = {{"triangles", info.size.triangles}, {"vertices", info.size.vertices}};
+  if (const auto goal = sinks.filter->simplify_goal()) object["simplify_goal"] = *goal;
+  if (const auto measure = sinks.filter->measure()) object["measure"] = measure_json(*measure);
+  if (const auto* levels = dynamic_cast<const LevelSink*>(sinks.file.get()))
+    if (!levels->levels().empty()) object["levels"] = tools::levels_json(levels->levels());
+  return object;
+}
+
+std::string merge_text(const MergeJob& job, const PiecesInfo& info, const MergeSinks& sinks,
+                       std::uint64_t bytes, double seconds) {
+  const MeshSize size = sinks.filter->size();
+  std::string text = fmt::format(
+      "isovalue {}: {} triangles{} of {} {} in {}\n", info.isovalue, human_count(size.triangles),
+      has_vertices(job.form.format) ? fmt::format(", {} vertices", human_count(size.vertices)) : "",
+      human_count(job.pieces.size()), job.pieces.size() == 1 ? "piece" : "pieces",
+      human_seconds(seconds));
+  if (info.size.triangles > size.triangles)
+    text += fmt::format("  of {} triangles\n", human_count(info.size.triangles));
+  if (const auto measure = sinks.filter->measure()) text += measure_text(*measure);
+  return text + fmt::format("  {} ({})\n", job.output.string(), human_bytes(bytes));
+}
+
+int run_merge(const MergeArguments& arguments, Console& console) {
+  refuse_url_output(arguments.output);
+  MergeJob job{.form = form_of(arguments),
+               .filter = filter_options(arguments.filters),
+               .memory = arguments.memory,
+               .threads = arguments.threads,
+               .force = arguments.force,
+               .no_space_check = arguments.no_space_check};
+  check_filters(arguments.filters, false);
+  job.pieces.assign(arguments.pieces.begin(), arguments.pieces.end());
+  job.output = !arguments.output.empty()
+                   ? fs::path(has_levels(job.form.format) ? without_slash(arguments.output)
+                                                          : fs::path(arguments.output))
+                   : default_output(arguments.pieces.front(), job.form.format);
+  if (is_standard_output(job.output.native())) console.reserve_output();
+  MergeResult made = merge(std::move(job), console);
+  ordered_json result{{"command", "merge"}};
+  result.update(made.object);
+  result["peak_resident_bytes"] = peak_resident_bytes();
+  console.result(result, made.text);
+  return 0;
+}
+
+}  // namespace
+
+MergeResult merge(MergeJob job, Console& console) {
+  double seconds = 0;
+  const PiecesInfo info = read_pieces(job.pieces);
+  job.form.normals = info.header.has_normals && has_normals(job.form.format);
+  check_replaces_no_input(job.output, job.pieces);
+  check_disk(job, info);
+  const MergeSinks sinks = open_sinks(job, info, console.progress());
+  {
+    const Stopwatch watch(seconds);
+    merge_pieces(job.pieces, *sinks.filter, {.normals = job.form.normals, .memory = job.memory},
+                 console.progress());
+  }
+  const std::uint64_t bytes =
+      is_standard_output(job.output.native()) ? sinks.file->bytes() : mesh_bytes(job.output);
+  if (sinks.filter->size().triangles == 0)
+    console.note(fmt::format("isovalue {}: the surface is empty", info.isovalue));
+  return {merge_json(job, info, sinks, bytes, seconds),
+          merge_text(job, info, sinks, bytes, seconds)};
+}
+
+void add_merge(Program& program) {
+  auto arguments = std::make_shared<MergeArguments>();
+  CLI::App* app = add_subcommand(program, "merge",
+                                 "Put the pieces of a mesh together, which 'extract --part' made.",
+                                 "isobrick extract head.zarr --isovalue 900 --part 1/2   # writes head_900_1of2.piece\n"
+      "  isobrick extract head.zarr --isovalue 900 --part 2/2   # on another machine\n"
+      "  isobrick merge head_900_*of2.piece -o head_900.ply");
+  add_paths(app, "PIECES", arguments->pieces, "All pieces of the mesh, in any order");
+  add_output(app, arguments->output, "MESH",
+             "Mesh to write, .ply, .stl, .obj, .glb, .vtp, .pvtp or .neuroglancer; - for standard "
+             "output",
+             "head_500.ply of head_500_1of8.piece, in the current folder");
+  add_parsed(app, arguments->format,
+             [](const std::string& text) { return std::optional(parse_mesh_format(text)); },
+             {"--format", "ply|stl|obj|glb|vtp|pvtp|neuroglancer", "Format of the mesh",
+              "by its extension, or ply"});
+  add_flag(app, "--quantize", arguments->quantize,
+           "GLB with positions and normals of 16 bits (KHR_mesh_quantization)");
+  add_parsed(app, arguments->levels, parse_detail_levels,
+             {"--levels", "auto|N", "Levels of detail of neuroglancer's format at most", "auto"});
+  add_flag(app, "--sharded", arguments->sharded, "neuroglancer's format in few large files");
+  add_filters(app, arguments->filters);
+  add_memory(app, arguments->memory);
+  add_threads(app, arguments->threads);
+  add_force(app, arguments->force);
+  add_flag(app, "--no-space-check", arguments->no_space_check,
+           "Begin even if the disk is too small");
+  add_run(program, app, arguments, run_merge);
+}
+
+}  // namespace isobrick::tools
