@@ -98,13 +98,6 @@ std::string why_empty(const ExtractOptions& options, const ExtractReport& report
   return empty + "; " + range_text(store, options.level);
 }
 
-/// Whether a simplification left clearly more triangles than it was to.
-bool misses_goal(const ExtractReport& report, const FilteredSurface& filtered) {
-  constexpr double kTolerance = 1.05;
-  return filtered.simplify_goal && static_cast<double>(report.triangles) >
-                                       kTolerance * static_cast<double>(*filtered.simplify_goal);
-}
-
 struct SurfaceReports {
   std::vector<ExtractReport> reports;  ///< of each mesh, or of the picture where there is no mesh
   std::vector<FilteredSurface> filtered;
@@ -150,12 +143,6 @@ SurfaceReports make(const std::vector<ExtractedSurface>& surfaces, const std::ve
   return made;
 }
 
-/// Reports each surface.
-struct CommandOutput {
-  ordered_json objects = ordered_json::array(), passes;  ///< no passes of an estimate
-  std::string text;
-};
-
 CommandOutput estimate_all(const std::vector<ExtractedSurface>& surfaces, const StoreReader& store,
                            Console& console) {
   CommandOutput result;
@@ -186,11 +173,9 @@ CommandOutput make_all(const ExtractArguments& arguments,
     const FilteredSurface& filtered = made.filtered[i];
     if (report.triangles == 0)
       console.note(why_empty(surfaces[i].options, report, filtered, store));
-    if (misses_goal(report, filtered))
-      console.note(fmt::format(
-          "{} triangles are left instead of {}: components, handles and borders stay{}",
-          report.triangles, *filtered.simplify_goal,
-          surfaces[i].filter.max_error > 0 ? ", and what --max-error does not permit" : ""));
+    if (const std::string note = goal_note(report.triangles, filtered, surfaces[i].filter);
+        !note.empty())
+      console.note(note);
     const std::uint64_t bytes = !sinks[i].mesh ? 0
                                 : is_standard_output(arguments.output)
                                     ? sinks[i].mesh->bytes()
@@ -234,8 +219,9 @@ int run_extract(const ExtractArguments& given, Console& console) {
   const std::vector<ExtractedSurface> surfaces = plan_surfaces(arguments, store, console);
   for (const ExtractedSurface& surface : surfaces)
     note_band(surface.options.isovalue, store.info(), console);
-  const CommandOutput output = arguments.estimate
-                                   ? estimate_all(surfaces, store, console)
+  const CommandOutput output = arguments.estimate ? estimate_all(surfaces, store, console)
+                               : arguments.resume
+                                   ? make_resumable(arguments, surfaces, store, console)
                                    : make_all(arguments, surfaces, store, attributes, console);
   ordered_json result{{"command", "extract"},
                       {"input", arguments.input.path},
@@ -377,6 +363,9 @@ void add_extract(Program& program) {
   add_memory(app, arguments->memory);
   add_threads(app, arguments->threads);
   add_backend_options(app, *arguments);
+  add_flag(app, "--resume", arguments->resume,
+           "Make the mesh by way of pieces in a folder beside it, and go on with those that an "
+           "interrupted run left");
   add_force(app, arguments->force);
   add_flag(app, "--no-space-check", arguments->no_space_check,
            "Begin even if, by the estimate, the disk is too small");

@@ -11,6 +11,7 @@
 #include "bricks/zarr/metadata_files.h"
 #include "io/bytes/output_guard.h"
 #include "tools/format.h"
+#include "tools/interrupt.h"
 #include "tools/output_name.h"
 
 namespace isobrick::tools {
@@ -103,6 +104,7 @@ int run_extract_part(const ExtractArguments& given, Console& console) {
   const StoreReader& store = input.store();
   const std::vector<ExtractedSurface> surfaces = plan_pieces(given, store, console);
   const std::vector<fs::path> inputs{given.input.path};
+  set_interrupt_note([] { return "the same command begins the piece anew"; });
   ordered_json objects = ordered_json::array();
   std::string text;
   for (const ExtractedSurface& surface : surfaces) {

@@ -48,7 +48,7 @@ struct ExtractArguments {
   Backend backend = Backend::automatic;
   std::uint64_t gpu_memory = 0;
   int device = 0;
-  bool estimate = false, force = false, no_space_check = false;
+  bool estimate = false, force = false, no_space_check = false, resume = false;
 
   /// Whether meshes are written.
   bool writes_mesh() const { return !output.empty() || (preview.path.empty() && !estimate); }

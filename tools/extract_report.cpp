@@ -47,6 +47,17 @@ std::string what_was_read(const ExtractReport& r) {
 
 }  // namespace
 
+std::string goal_note(std::uint64_t triangles, const FilteredSurface& filtered,
+                      const MeshFilterOptions& filter) {
+  constexpr double kTolerance = 1.05;
+  if (!filtered.simplify_goal ||
+      static_cast<double>(triangles) <= kTolerance * static_cast<double>(*filtered.simplify_goal))
+    return {};
+  return fmt::format("{} triangles are left instead of {}: components, handles and borders stay{}",
+                     triangles, *filtered.simplify_goal,
+                     filter.max_error > 0 ? ", and what --max-error does not permit" : "");
+}
+
 ordered_json estimate_json(const ExtractedSurface& surface, const ExtractEstimate& e) {
   return {{"isovalue", surface.options.isovalue},
           {"bricks", {{"total", e.active.bricks}, {"active", e.active.active_bricks}}},

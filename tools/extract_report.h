@@ -37,6 +37,17 @@ struct FilteredSurface {
   std::vector<WrittenLevel> levels;            ///< of detail, of formats that have them
 };
 
+/// What a command reports of its surfaces.
+struct CommandOutput {
+  nlohmann::ordered_json objects = nlohmann::ordered_json::array(),
+                         passes;  ///< of an estimate none
+  std::string text;
+};
+
+/// Why clearly more triangles are left than a simplification aimed at; empty where they are not.
+std::string goal_note(std::uint64_t triangles, const FilteredSurface& filtered,
+                      const MeshFilterOptions& filter);
+
 /// What is expected of a surface, for --json and for people.
 nlohmann::ordered_json estimate_json(const ExtractedSurface& surface, const ExtractEstimate& e);
 std::string estimate_text(const ExtractedSurface& surface, const ExtractEstimate& e);

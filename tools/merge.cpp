@@ -105,39 +105,40 @@ MergeSinks open_sinks(const MergeJob& job, const PiecesInfo& info, Progress& pro
   return sinks;
 }
 
-ordered_json merge_json(const MergeJob& job, const PiecesInfo& info, const MergeSinks& sinks,
-                        std::uint64_t bytes, double seconds) {
-  const MeshSize size = sinks.filter->size();
-  ordered_json object{
-      {"pieces", job.pieces.size()},
-      {"isovalue", info.isovalue},
-      {"output", job.output.string()},
-      {"output_bytes", bytes},
-      {"triangles", size.triangles},
-      {"vertices", has_vertices(job.form.format) ? ordered_json(size.vertices) : ordered_json()},
-      {"degenerate_triangles", info.degenerate},
-      {"seconds", seconds}};
+ordered_json merge_json(const MergeJob& job, const MergeResult& made) {
+  ordered_json object{{"command", "merge"},
+                      {"pieces", job.pieces.size()},
+                      {"isovalue", made.pieces.isovalue},
+                      {"output", job.output.string()},
+                      {"output_bytes", made.bytes},
+                      {"triangles", made.size.triangles},
+                      {"vertices", has_vertices(job.form.format) ? ordered_json(made.size.vertices)
+                                                                 : ordered_json()},
+                      {"degenerate_triangles", made.pieces.degenerate},
+                      {"seconds", made.seconds}};
+  const FilteredSurface& filtered = made.filtered;
   if (job.filter.changes_mesh())
-    object["extracted"] = {{"triangles", info.size.triangles}, {"vertices", info.size.vertices}};
-  if (const auto goal = sinks.filter->simplify_goal()) object["simplify_goal"] = *goal;
-  if (const auto measure = sinks.filter->measure()) object["measure"] = measure_json(*measure);
-  if (const auto* levels = dynamic_cast<const LevelSink*>(sinks.file.get()))
-    if (!levels->levels().empty()) object["levels"] = tools::levels_json(levels->levels());
+    object["extracted"] = {{"triangles", filtered.extracted.triangles},
+                           {"vertices", filtered.extracted.vertices}};
+  if (filtered.simplify_goal) object["simplify_goal"] = *filtered.simplify_goal;
+  if (filtered.measure) object["measure"] = measure_json(*filtered.measure);
+  if (!filtered.levels.empty()) object["levels"] = tools::levels_json(filtered.levels);
+  object["peak_resident_bytes"] = peak_resident_bytes();
   return object;
 }
 
-std::string merge_text(const MergeJob& job, const PiecesInfo& info, const MergeSinks& sinks,
-                       std::uint64_t bytes, double seconds) {
-  const MeshSize size = sinks.filter->size();
+std::string merge_text(const MergeJob& job, const MergeResult& made) {
   std::string text = fmt::format(
-      "isovalue {}: {} triangles{} of {} {} in {}\n", info.isovalue, human_count(size.triangles),
-      has_vertices(job.form.format) ? fmt::format(", {} vertices", human_count(size.vertices)) : "",
+      "isovalue {}: {} triangles{} of {} {} in {}\n", made.pieces.isovalue,
+      human_count(made.size.triangles),
+      has_vertices(job.form.format) ? fmt::format(", {} vertices", human_count(made.size.vertices))
+                                    : "",
       human_count(job.pieces.size()), job.pieces.size() == 1 ? "piece" : "pieces",
-      human_seconds(seconds));
-  if (info.size.triangles > size.triangles)
-    text += fmt::format("  of {} triangles\n", human_count(info.size.triangles));
-  if (const auto measure = sinks.filter->measure()) text += measure_text(*measure);
-  return text + fmt::format("  {} ({})\n", job.output.string(), human_bytes(bytes));
+      human_seconds(made.seconds));
+  if (made.filtered.extracted.triangles > made.size.triangles)
+    text += fmt::format("  of {} triangles\n", human_count(made.filtered.extracted.triangles));
+  if (made.filtered.measure) text += measure_text(*made.filtered.measure);
+  return text + fmt::format("  {} ({})\n", job.output.string(), human_bytes(made.bytes));
 }
 
 int run_merge(const MergeArguments& arguments, Console& console) {
@@ -155,41 +156,43 @@ int run_merge(const MergeArguments& arguments, Console& console) {
                                                           : fs::path(arguments.output))
                    : default_output(arguments.pieces.front(), job.form.format);
   if (is_standard_output(job.output.native())) console.reserve_output();
-  MergeResult made = merge(std::move(job), console);
-  ordered_json result{{"command", "merge"}};
-  result.update(made.object);
-  result["peak_resident_bytes"] = peak_resident_bytes();
-  console.result(result, made.text);
+  const MergeResult made = merge(job, console);
+  console.result(merge_json(job, made), merge_text(job, made));
   return 0;
 }
 
 }  // namespace
 
 MergeResult merge(MergeJob job, Console& console) {
-  double seconds = 0;
-  const PiecesInfo info = read_pieces(job.pieces);
-  job.form.normals = info.header.has_normals && has_normals(job.form.format);
+  MergeResult made{.pieces = read_pieces(job.pieces)};
+  job.form.normals = made.pieces.header.has_normals && has_normals(job.form.format);
   check_replaces_no_input(job.output, job.pieces);
-  check_disk(job, info);
-  const MergeSinks sinks = open_sinks(job, info, console.progress());
+  check_disk(job, made.pieces);
+  const MergeSinks sinks = open_sinks(job, made.pieces, console.progress());
   {
-    const Stopwatch watch(seconds);
+    const Stopwatch watch(made.seconds);
     merge_pieces(job.pieces, *sinks.filter, {.normals = job.form.normals, .memory = job.memory},
                  console.progress());
   }
-  const std::uint64_t bytes =
+  made.size = sinks.filter->size();
+  made.filtered = {made.pieces.size, sinks.filter->measure(), sinks.filter->simplify_goal()};
+  if (const auto* levels = dynamic_cast<const LevelSink*>(sinks.file.get()))
+    made.filtered.levels = levels->levels();
+  made.bytes =
       is_standard_output(job.output.native()) ? sinks.file->bytes() : mesh_bytes(job.output);
-  if (sinks.filter->size().triangles == 0)
-    console.note(fmt::format("isovalue {}: the surface is empty", info.isovalue));
-  return {merge_json(job, info, sinks, bytes, seconds),
-          merge_text(job, info, sinks, bytes, seconds)};
+  if (made.size.triangles == 0)
+    console.note(fmt::format("isovalue {}: the surface is empty", made.pieces.isovalue));
+  if (const std::string note = goal_note(made.size.triangles, made.filtered, job.filter);
+      !note.empty())
+    console.note(note);
+  return made;
 }
 
 void add_merge(Program& program) {
   auto arguments = std::make_shared<MergeArguments>();
-  CLI::App* app = add_subcommand(program, "merge",
-                                 "Put the pieces of a mesh together, which 'extract --part' made.",
-                                 "isobrick extract head.zarr --isovalue 900 --part 1/2   # writes head_900_1of2.piece\n"
+  CLI::App* app = add_subcommand(
+      program, "merge", "Put the pieces of a mesh together, which 'extract --part' made.",
+      "isobrick extract head.zarr --isovalue 900 --part 1/2   # writes head_900_1of2.piece\n"
       "  isobrick extract head.zarr --isovalue 900 --part 2/2   # on another machine\n"
       "  isobrick merge head_900_*of2.piece -o head_900.ply");
   add_paths(app, "PIECES", arguments->pieces, "All pieces of the mesh, in any order");

@@ -5,9 +5,8 @@
 #include <string>
 #include <vector>
 
-#include <nlohmann/json.hpp>
-
 #include <isobrick/pieces.h>
+#include "tools/extract_report.h"
 #include "tools/filter_options.h"
 #include "tools/mesh_output.h"
 #include "tools/options.h"
@@ -25,13 +24,16 @@ struct MergeJob {
   bool force = false, no_space_check = false;
 };
 
-/// What a merge reports: members of a JSON object, and a text.
+/// What a merge made.
 struct MergeResult {
-  nlohmann::ordered_json object;
-  std::string text;
+  PiecesInfo pieces;
+  MeshSize size;  ///< of the mesh
+  FilteredSurface filtered;
+  std::uint64_t bytes = 0;  ///< of the file
+  double seconds = 0;
 };
 
-/// Makes the mesh.
+/// Makes the mesh, and writes notes of what is odd about it.
 MergeResult merge(MergeJob job, Console& console);
 
 }  // namespace isobrick::tools

@@ -195,8 +195,10 @@ TEST_F(Pieces, BecomeTheMeshOfASingleExtractionWhereSamplesAreMissing) {
   }
 }
 
-TEST_F(Pieces, OfThinVolumes) {
-  for (const Int3 extent : {Int3{300, 2, 40}, Int3{3, 400, 3}, Int3{500, 180, 1}}) {
+/// Also of several range chunks of 512 cells.
+TEST_F(Pieces, OfThinAndWideVolumes) {
+  for (const Int3 extent : {Int3{300, 2, 40}, Int3{1100, 40, 3}, Int3{34, 3, 1100},
+                            Int3{530, 540, 35}, Int3{500, 180, 1}}) {
     const auto field = busy_field<std::uint16_t>(extent);
     const StoreReader reader = store(field);
     for (const bool drops : {false, true}) {

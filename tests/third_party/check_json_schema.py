@@ -101,6 +101,8 @@ def run_commands(check):
     for output in ("e.ply", "e.stl"):
         check.run("extract_estimate", "extract", "a.zarr", "--isovalue", "128", "--estimate",
                   "-o", output)
+    check.run("extract", "extract", "a.zarr", "--isovalue", "120,128", "-o", "r.ply", "--resume",
+              "--largest", "1", "--measure")
     check.run("extract_part", "extract", "a.zarr", "--isovalue", "128", "--part", "1/1",
               "--drop-degenerate", "-o", "a.piece")
     check.run("extract_part", "extract", "a.zarr", "--isovalue", "128", "--part", "1/1",

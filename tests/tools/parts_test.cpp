@@ -223,5 +223,39 @@ TEST_F(Parts, KeepABudgetWhenTheyAreMerged) {
 #endif
 }
 
+TEST_F(Parts, ResumeAnExtraction) {
+  const Arguments options{"--drop-degenerate", "--largest", "2", "--measure"};
+  run_json(extract(words({"-o", path("one.glb")}, options)));
+  const Arguments resumable = extract(words({"-o", path("r.glb"), "--resume"}, options));
+  // What an interrupted run leaves: a piece that is whole, or one that is not.
+  const fs::path folder = path("r.glb.pieces");
+  for (const bool damaged : {false, true}) {
+    fs::create_directory(folder);
+    run_json(extract({"--part", "1/1", "--drop-degenerate", "-o", folder / "1of1.piece"}));
+    if (damaged) write_file(folder / "1of1.piece", read_file(folder / "1of1.piece").substr(0, 999));
+    const auto made = run_json(resumable)["surfaces"][0];
+    EXPECT_EQ(made["pieces"], (nlohmann::json{{"total", 1}, {"kept", damaged ? 0 : 1}}));
+    EXPECT_EQ(made["output_bytes"], fs::file_size(path("one.glb")));
+    EXPECT_TRUE(made.contains("measure"));
+    expect_same(path("one.glb"), path("r.glb"));
+    EXPECT_FALSE(fs::exists(folder));
+    expect_refused(run(resumable), 2, {"exists already"});
+    fs::remove(path("r.glb"));
+  }
+  const auto fresh = run_json(resumable)["surfaces"][0];
+  EXPECT_EQ(fresh["pieces"]["kept"], 0);
+  EXPECT_GT(fresh["bytes_read"], 0);
+}
+
+TEST_F(Parts, ResumeLeavesOtherFilesInItsFolder) {
+  fs::create_directory(path("r.ply.pieces"));
+  write_file(path("r.ply.pieces/notes.txt"), "mine");
+  run_json(extract({"-o", path("r.ply"), "--resume"}));
+  EXPECT_EQ(read_file(path("r.ply.pieces/notes.txt")), "mine");
+  expect_refused(run(extract({"-o", "-", "--resume"})), 2, {"--resume", "-o"});
+  expect_refused(run(extract({"-o", path("p.ply"), "--resume", "--preview", path("p.png")})), 2,
+                 {"--resume", "--preview"});
+}
+
 }  // namespace
 }  // namespace isobrick::test
