@@ -247,6 +247,22 @@ void StoreWriter::keep_shard(int level, Int3 s) {
   impl_->put_checksums(l, s, checksums);
 }
 
+bool StoreWriter::take_shard(int level, Int3 s, const std::filesystem::path& other) {
+  const std::filesystem::path path = impl_->shard_path(impl_->level(level), s);
+  const std::filesystem::path from = other / path.lexically_relative(impl_->dir);
+  impl_->publisher->folder().make_folder(path.parent_path());
+  std::error_code failure;
+  std::filesystem::rename(from, path, failure);
+  if (failure && failure != std::errc::no_such_file_or_directory)
+    throw system_error("move a shard to", path.string(), failure.value());
+  const File file = impl_->publisher->folder().open_file(path, O_RDONLY);
+  if (!file) return false;
+  if (!failure) impl_->publisher->count(file.size());
+  return true;
+}
+
+void StoreWriter::sync_shards() { impl_->publisher->wait(); }
+
 /// `checksums` of all bricks of a shard, also of those beyond the volume.
 void StoreWriter::Impl::put_checksums(const Level& l, Int3 s,
                                       std::span<const std::uint32_t> checksums) const {

@@ -40,6 +40,12 @@ class StoreWriter {
   void finish_shard(int level, Int3 s);
   /// The same of a shard that was whole: takes the checksums of its bricks from its file.
   void keep_shard(int level, Int3 s);
+  /// Takes a shard that another writer finished, from its folder `other` of the same layout and
+  /// file system; one that was taken already stays. Then finish_shard() or keep_shard() follow:
+  /// whether the shard has bricks.
+  bool take_shard(int level, Int3 s, const std::filesystem::path& other);
+  /// Returns when all shards that were finished are on disk, and throws what failed.
+  void sync_shards();
   /// Removes what an earlier run may have left of a shard that has no bricks and is not finished.
   void forget_shard(int level, Int3 s);
   /// All shards with bricks below `z` (in bricks) are finished or kept; what was not put is

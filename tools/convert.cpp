@@ -10,6 +10,7 @@
 #include "pipeline/convert/convert_staging.h"
 #include "pipeline/convert/store_source.h"
 #include "tools/input.h"
+#include "tools/interrupt.h"
 #include "tools/output_name.h"
 
 namespace isobrick::tools {
@@ -69,7 +70,10 @@ int run_convert(const ConvertArguments& arguments, Console& console) {
   const auto source = open_input(arguments);
   ConvertOptions options = arguments.store;
   options.inputs = input_paths(arguments.in);
-  note_conversion(out);
+  if (options.part)
+    set_interrupt_note([] { return "the same command goes on with what is done"; });
+  else
+    note_conversion(out);
   if (source->info().labels && options.downsampling && *options.downsampling == Downsampling::mean)
     console.note(
         "it is a label image, and --downsample mean makes labels of coarser levels that none of "
@@ -78,7 +82,11 @@ int run_convert(const ConvertArguments& arguments, Console& console) {
   const ConvertReport report = arguments.in == "-"
                                    ? convert_stream(*source, out, options, console)
                                    : convert(*source, out, options, console.progress());
-  report_conversion(console, "convert", arguments.in, out, source->info(), report, source->notes());
+  const std::string made =
+      options.part ? fmt::format("{}.parts/{}of{}", out, options.part->number, options.part->count)
+                   : out;
+  report_conversion(console, "convert", arguments.in, made, source->info(), report,
+                    source->notes());
   return 0;
 }
 
@@ -99,6 +107,17 @@ void add_convert(Program& program) {
   add_volume_options(app, arguments->volume);
   add_region(app, arguments->region);
   add_store_options(app, arguments->store);
+  add_parsed(
+      app, arguments->store.part,
+      [](const std::string& text) { return std::optional(parse_part(text)); },
+      {"--part", "I/N",
+       "Convert only part I of N, beside the output in OUT.zarr.parts; what is whole there is "
+       "kept"});
+  add_parsed(app, arguments->store.join,
+             [](const std::string& text) {
+               return static_cast<std::uint32_t>(parse_int(text, 1, kMaxParts));
+             },
+             {"--join", "N", "Make the store of all N parts, which are there; reads no samples"});
   add_run(program, app, arguments, run_convert);
 }
 

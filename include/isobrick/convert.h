@@ -11,6 +11,7 @@
 #include <isobrick/downsampling.h>
 #include <isobrick/image_metadata.h>
 #include <isobrick/index_build.h>
+#include <isobrick/part.h>
 #include <isobrick/progress.h>
 #include <isobrick/volume_source.h>
 
@@ -42,6 +43,13 @@ struct ConvertOptions {
   Index leaf = kDefaultLeaf;                       ///< of that index
   /// Ends the operation with Cancelled, soon after a stop is requested on any thread.
   std::stop_token cancel = {};
+  /// Writes only this part of the finest level, to the folder `out` + ".parts": the work of one of
+  /// several tasks. Its shards that are whole are kept. `resume`, `force` and `index` do not
+  /// matter.
+  std::optional<Part> part = {};
+  /// Makes the store of so many parts that are all there, instead of reading samples; 0: reads
+  /// them.
+  std::uint32_t join = 0;
 };
 
 /// What a conversion did.

@@ -8,9 +8,12 @@
 #include "bricks/store_writer.h"
 #include "core/cancellable_progress.h"
 #include "core/stopwatch.h"
+#include "pipeline/check_part.h"
 #include "pipeline/convert/convert_cascade.h"
+#include "pipeline/convert/convert_join.h"
 #include "pipeline/convert/convert_journal.h"
 #include "pipeline/convert/convert_level.h"
+#include "pipeline/convert/convert_part.h"
 #include "pipeline/convert/convert_plan.h"
 #include "pipeline/convert/convert_sparse.h"
 #include "pipeline/convert/convert_staging.h"
@@ -39,15 +42,16 @@ IndexOptions index_options(const ConvertOptions& options, bool resume) {
 /// One conversion into a staging directory.
 class Conversion {
  public:
-  /// By one of `plan` and `sparse`; the other is null.
+  /// By one of `plan` and `sparse`; the other is null. With `joined` level 0 is there.
   Conversion(VolumeSource& source, const StoreLayout& layout, const ConvertPlan* plan,
-             SparsePyramid* sparse, ConvertStaging& staging, const ConvertOptions& options,
-             Progress& progress)
+             SparsePyramid* sparse, const JoinedParts* joined, ConvertStaging& staging,
+             const ConvertOptions& options, Progress& progress)
       : source_(source),
         layout_(layout),
         options_(options),
         plan_(plan),
         sparse_(sparse),
+        joined_(joined),
         staging_(staging),
         progress_(progress),
         store_(staging.path(), layout, staging.resumed()),
@@ -65,7 +69,7 @@ class Conversion {
   int level_count() const { return static_cast<int>(layout_.levels.size()); }
 
   void add_chosen_index(ConvertReport& report);
-  void write_levels();
+  void write_levels(int first_level, VolumeSource& source);
   void write_cascade(int first_level, VolumeSource& source);
   std::unique_ptr<SpooledVolume> write_in_pieces(int level, VolumeSource& source);
   std::unique_ptr<SpooledVolume> spool_stream();
@@ -75,6 +79,7 @@ class Conversion {
   const ConvertOptions& options_;
   const ConvertPlan* plan_;
   SparsePyramid* sparse_;
+  const JoinedParts* joined_;
   ConvertStaging& staging_;
   Progress& progress_;
   StoreWriter store_;
@@ -93,8 +98,14 @@ ConvertReport Conversion::run() {
     report.bricks_absent = counts.absent;
     report.bricks_kept = counts.kept;
     has_nan = counts.has_nan;
+  } else if (joined_ != nullptr) {
+    const JoinedParts::Counts counts = joined_->add_to(store_, *counts_);
+    report.bricks = counts.bricks;
+    report.bricks_absent = counts.absent;
+    has_nan = counts.has_nan;
+    if (level_count() > 1) write_levels(1, joined_->coarser());
   } else {
-    write_levels();
+    write_levels(0, source_);
   }
   for (const auto& writer : writers_) {
     report.bricks += writer->counts().bricks;
@@ -128,17 +139,19 @@ void Conversion::add_chosen_index(ConvertReport& report) {
   report.index_seconds = added.seconds;
 }
 
-void Conversion::write_levels() {
+/// `source` is of the first level.
+void Conversion::write_levels(int first_level, VolumeSource& source) {
   std::unique_ptr<SpooledVolume> spooled;
-  if (!source_.random_access() && !plan_->cascade_fits(0)) spooled = spool_stream();
-  progress_.begin("convert", bytes_of(source_.info().extent, source_.info().type));
-  for (int level = 0; level < level_count(); ++level) {
-    VolumeSource& source = spooled ? static_cast<VolumeSource&>(*spooled) : source_;
+  if (!source.random_access() && !plan_->cascade_fits(0)) spooled = spool_stream();
+  progress_.begin("convert",
+                  first_level == 0 ? bytes_of(source.info().extent, source.info().type) : 0);
+  for (int level = first_level; level < level_count(); ++level) {
+    VolumeSource& of_level = spooled ? static_cast<VolumeSource&>(*spooled) : source;
     if (plan_->cascade_fits(level)) {
-      write_cascade(level, source);
+      write_cascade(level, of_level);
       break;
     }
-    spooled = write_in_pieces(level, source);
+    spooled = write_in_pieces(level, of_level);
   }
   progress_.end();
 }
@@ -214,27 +227,38 @@ ConvertReport convert(VolumeSource& source, const std::filesystem::path& out,
   CancellableProgress progress(listener, options.cancel);
   Stopwatch watch;
   const StoreLayout layout = plan_layout(source.info(), options, source.sparse());
+  if (options.part) {
+    check_part(*options.part);
+    check_part_output(out, options);
+    ConvertReport report = convert_part(source, layout, out, options, progress);
+    report.seconds = watch.lap();
+    return report;
+  }
   const Lattice& finest = layout.levels.front().lattice;
   const std::uint64_t index_memory =
       options.index ? min_index_memory(index_options(options, false), finest) : 0;
   const int threads = Workers(options.threads).threads();
   std::optional<ConvertPlan> plan;
   std::optional<SparsePyramid> sparse;
-  if (SparsePyramid::possible(source, layout))
+  if (options.join == 0 && SparsePyramid::possible(source, layout))
     sparse.emplace(source, layout, options, threads, index_memory);
   else
-    plan.emplace(layout, options.memory, threads, source.random_access(), source.memory(),
-                 index_memory);
+    plan.emplace(layout, options.memory, threads, source.random_access() || options.join > 0,
+                 source.memory(), index_memory);
   if (options.index) check_index_options(index_options(options, false), finest);
   std::vector<std::filesystem::path> inputs = options.inputs;
   inputs.insert(inputs.end(), source.info().files.begin(), source.info().files.end());
-  ConvertStaging staging(out, options.resume, options.force, std::move(inputs));
+  std::optional<JoinedParts> joined;
+  if (options.join > 0) joined.emplace(layout, out, options.join);
+  // What an interrupted join has moved is not in the parts any more.
+  ConvertStaging staging(out, options.resume || joined, options.force, std::move(inputs));
   Workers workers(plan ? plan->threads() : sparse->threads());
   ConvertReport report = workers.execute([&] {
-    return Conversion(source, layout, plan ? &*plan : nullptr, sparse ? &*sparse : nullptr, staging,
-                      options, progress)
+    return Conversion(source, layout, plan ? &*plan : nullptr, sparse ? &*sparse : nullptr,
+                      joined ? &*joined : nullptr, staging, options, progress)
         .run();
   });
+  if (joined) joined->remove();
   report.seconds = watch.lap();
   return report;
 }

@@ -9,6 +9,7 @@
 #include <isobrick/version.h>
 #include "bricks/ranges/stored_ranges.h"
 #include "io/bytes/output_file.h"
+#include "pipeline/check_part.h"
 #include "pipeline/extract/extract_part.h"
 #include "pipeline/extract/mesh_header.h"
 #include "pipeline/pieces/part_plan.h"
@@ -20,15 +21,17 @@ namespace {
 
 using nlohmann::json;
 
-json to_json(Int3 v) { return {v.x, v.y, v.z}; }
-json to_json(Vec3d v) { return {v.x, v.y, v.z}; }
+template <class T>
+json list_of(Vec3<T> v) {
+  return {v.x, v.y, v.z};
+}
 
 /// By what samples of a level are recognised, wherever the store lies.
 json samples_json(const StoreReader& store, int level) {
   const StoreInfo& info = store.info();
   const LevelInfo& of_level = info.levels[static_cast<std::size_t>(level)];
   json object{{"level", level},
-              {"extent", to_json(of_level.lattice.extent)},
+              {"extent", list_of(of_level.lattice.extent)},
               {"type", std::string(short_name(of_level.lattice.type))},
               {"block_range_crc32c", of_level.block_ranges_crc32c}};
   // Their checksums differ wherever a brick does.
@@ -53,9 +56,9 @@ json mesh_json(const StoreReader& store, const ExtractRequest& request, int leve
           {"drop_degenerate", surface.drop_degenerate},
           {"topology", surface.topology == Topology::trilinear ? "trilinear" : "consistent"},
           {"cap", surface.cap},
-          {"region", {to_json(surface.roi.lo), to_json(surface.roi.hi)}},
+          {"region", {list_of(surface.roi.lo), list_of(surface.roi.hi)}},
           {"transform",
-           {to_json(transform.spacing), to_json(transform.origin), transform.direction,
+           {list_of(transform.spacing), list_of(transform.origin), transform.direction,
             transform.unit}}};
 }
 
@@ -94,9 +97,9 @@ PieceReport extract_piece(const StoreReader& store, const ExtractOptions& option
         "a piece has a name, by which it is found again: it cannot go to standard output");
   const ExtractRequest request = check_request(store, options, Indexing::welded);
   const PartPlan plan = plan_part(store, request, options.level, part);
-  const PieceHeader header{part, plan.tiles, mesh_json(store, request, options.level),
-                           mesh_header(request.level->transform, request.level->lattice.extent,
-                                       request.surface.normals, plan.bounds)};
+  const PieceDescription header{part, plan.tiles, mesh_json(store, request, options.level),
+                                mesh_header(request.level->transform, request.level->lattice.extent,
+                                            request.surface.normals, plan.bounds)};
   PieceReport report;
   if (const auto end = find_piece(path, to_text(header), force)) {
     report.is_kept = true;

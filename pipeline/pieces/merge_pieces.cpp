@@ -21,13 +21,13 @@ namespace {
 namespace fs = std::filesystem;
 
 /// Larger chunks of a mesh gain nothing.
-constexpr std::uint64_t kMaxChunk = std::uint64_t{4} << 20;
+constexpr std::uint64_t kMergeChunk = std::uint64_t{4} << 20;
 
 /// Pieces of one mesh, in the order of their parts.
 struct PieceSet {
   std::vector<fs::path> paths;
   std::vector<std::string> texts;  ///< their headers
-  PieceHeader first;
+  PieceDescription first;
   PiecesInfo info;
   std::uint64_t largest_tile = 0;
 };
@@ -76,7 +76,7 @@ class PieceCollector {
  private:
   void add(std::size_t argument) {
     const PieceReader reader(paths_[argument]);
-    const PieceHeader& header = reader.header();
+    const PieceDescription& header = reader.header();
     if (found_.empty()) set_.first = header;
     check_same(header, argument);
     found_.push_back({header.part.number, argument, header.tiles, reader.header_text()});
@@ -88,7 +88,7 @@ class PieceCollector {
     set_.largest_tile = std::max(set_.largest_tile, end.largest_tile);
   }
 
-  void check_same(const PieceHeader& header, std::size_t argument) const {
+  void check_same(const PieceDescription& header, std::size_t argument) const {
     std::string other = difference(set_.first.mesh, header.mesh);
     if (other.empty() && header.part.count != set_.first.part.count)
       other = fmt::format("number of parts ({} and {})", set_.first.part.count, header.part.count);
@@ -226,7 +226,7 @@ std::uint64_t plan_chunk(const PieceSet& set, std::uint64_t sink_bytes,
         "of it for the program and its libraries and {:.1f} for the output",
         in_mib(options.memory), mib_above(least), in_mib(kProgramBytes), in_mib(sink_bytes)));
   const std::uint64_t spare = (options.memory - least) / 2;
-  return set.largest_tile + std::min(spare, kMaxChunk);
+  return set.largest_tile + std::min(spare, kMergeChunk);
 }
 
 }  // namespace

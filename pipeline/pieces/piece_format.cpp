@@ -5,6 +5,7 @@
 #include <bit>
 
 #include <isobrick/error.h>
+#include "pipeline/check_part.h"
 #include "surface/surface_extractor.h"
 
 namespace isobrick::inline v0 {
@@ -21,8 +22,8 @@ Vec3d vector_of(const json& v) {
   return {v.at(0).get<double>(), v.at(1).get<double>(), v.at(2).get<double>()};
 }
 
-PieceHeader header_of(const json& object) {
-  PieceHeader header;
+PieceDescription header_of(const json& object) {
+  PieceDescription header;
   header.part = {object.at("part").at(0).get<std::uint32_t>(),
                  object.at("part").at(1).get<std::uint32_t>()};
   check_part(header.part);
@@ -44,12 +45,12 @@ PieceHeader header_of(const json& object) {
 
 }  // namespace
 
-Int3 PieceHeader::extent() const {
+Int3 PieceDescription::extent() const {
   const json& e = mesh.at("samples").at("extent");
   return {e.at(0).get<Index>(), e.at(1).get<Index>(), e.at(2).get<Index>()};
 }
 
-double PieceHeader::isovalue() const {
+double PieceDescription::isovalue() const {
   const json& value = mesh.at("isovalue");
   return value.is_string() ? std::stod(value.get<std::string>()) : value.get<double>();
 }
@@ -58,7 +59,7 @@ std::uint64_t content_bytes(const PieceTile& tile, bool normals) {
   return mesh_bytes({tile.vertices, tile.triangles}, normals);
 }
 
-std::string to_text(const PieceHeader& header) {
+std::string to_text(const PieceDescription& header) {
   const MeshHeader& of_mesh = header.of_mesh;
   json object{{"part", {header.part.number, header.part.count}},
               {"tiles", {header.tiles.begin, header.tiles.end}},
@@ -71,7 +72,7 @@ std::string to_text(const PieceHeader& header) {
   return object.dump();
 }
 
-std::optional<PieceHeader> parse_piece_header(std::string_view text) try {
+std::optional<PieceDescription> parse_description(std::string_view text) try {
   return header_of(json::parse(text));
 } catch (const json::exception&) {
   return std::nullopt;
@@ -94,12 +95,5 @@ std::string difference(const json& mesh, const json& other) {
 }
 
 std::string part_text(Part part) { return fmt::format("{} of {}", part.number, part.count); }
-
-void check_part(Part part) {
-  if (part.number < 1 || part.number > part.count || part.count > kMaxParts)
-    throw UsageError(fmt::format(
-        "there is no part {} of {}: parts are numbered from 1, and there are at most {}",
-        part.number, part.count, kMaxParts));
-}
 
 }  // namespace isobrick

@@ -16,7 +16,7 @@
 namespace isobrick::inline v0 {
 
 /// What a piece begins with.
-struct PieceHeader {
+struct PieceDescription {
   Part part;
   TileRange tiles;      ///< whose mesh it holds
   nlohmann::json mesh;  ///< whose part it is: samples and options
@@ -68,18 +68,15 @@ inline constexpr std::uint32_t kMaxTileTriangles = 1 << 20;
 std::uint64_t content_bytes(const PieceTile& tile, bool normals);
 
 /// The text of a header: one for each header.
-std::string to_text(const PieceHeader& header);
+std::string to_text(const PieceDescription& header);
 /// Nothing for a text that is none.
-std::optional<PieceHeader> parse_piece_header(std::string_view text);
+std::optional<PieceDescription> parse_description(std::string_view text);
 
-/// Where the members of two `PieceHeader::mesh` differ: words for a message such as "isovalue (1
-/// and 2)"; empty where they are equal.
+/// Where the members of two `PieceDescription::mesh` differ: words for a message such as "isovalue
+/// (1 and 2)"; empty where they are equal.
 std::string difference(const nlohmann::json& mesh, const nlohmann::json& other);
 
 /// "2 of 8".
 std::string part_text(Part part);
-
-/// Throws UsageError for a part that there is not.
-void check_part(Part part);
 
 }  // namespace isobrick

@@ -36,7 +36,7 @@ PieceReader::PieceReader(const std::filesystem::path& path) : file_(open_input(p
   if (end_.magic != PieceEnd::kMagic || end_.bytes != size ||
       end_.own_crc32c != crc32c(all.first(sizeof end_ - sizeof end_.own_crc32c)))
     fail("is cut off or changed at its end");
-  std::optional<PieceHeader> header = parse_piece_header(text_);
+  std::optional<PieceDescription> header = parse_description(text_);
   if (!header) fail("is damaged in its description");
   header_ = std::move(*header);
   crc_ = crc32c(std::as_bytes(std::span(text_)), crc32c(std::as_bytes(std::span(&start, 1))));

@@ -21,7 +21,7 @@ class PieceReader {
   /// piece of a version that this program knows, DamageError for one that shows damage.
   explicit PieceReader(const std::filesystem::path& path);
 
-  const PieceHeader& header() const { return header_; }
+  const PieceDescription& header() const { return header_; }
   const std::string& header_text() const { return text_; }
   const PieceEnd& end() const { return end_; }
 
@@ -46,7 +46,7 @@ class PieceReader {
 
   File file_;
   std::string text_;
-  PieceHeader header_;
+  PieceDescription header_;
   PieceEnd end_;
   std::uint64_t at_ = 0;  ///< bytes that were handed out
   std::uint32_t crc_ = 0;

@@ -9,7 +9,8 @@
 
 namespace isobrick::inline v0 {
 
-PieceWriter::PieceWriter(const std::filesystem::path& path, const PieceHeader& header, bool force)
+PieceWriter::PieceWriter(const std::filesystem::path& path, const PieceDescription& header,
+                         bool force)
     : out_(path.string(), force),
       tiles_(header.tiles),
       extent_(header.extent()),

@@ -20,7 +20,7 @@ namespace isobrick::inline v0 {
 class PieceWriter final : public MeshSink, public TilePlaces {
  public:
   /// The file has its name once it is finished; what was there before is replaced with `force`.
-  PieceWriter(const std::filesystem::path& path, const PieceHeader& header, bool force);
+  PieceWriter(const std::filesystem::path& path, const PieceDescription& header, bool force);
 
   void place(const TilePlace& tile) override;
 

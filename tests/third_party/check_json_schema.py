@@ -82,6 +82,8 @@ def run_commands(check):
     check.run("synth", "synth", "sphere", "b.raw", "--dims", "9,8,7", "--type", "f32")
     check.run("export", "export", "a.zarr", "a.nrrd")
     check.run("convert", "convert", "a.nrrd", "c.zarr")
+    check.run("convert", "convert", "a.nrrd", "p.zarr", "--part", "1/1")
+    check.run("convert", "convert", "a.nrrd", "p.zarr", "--join", "1")
     check.run("index", "index", "c.zarr", "--kind", "kdtree", "--leaf", "4")
     for options in ([], ["--stats"]):
         check.run("info", "info", "a.zarr", *options)

@@ -257,5 +257,24 @@ TEST_F(Parts, ResumeLeavesOtherFilesInItsFolder) {
                  {"--resume", "--preview"});
 }
 
+TEST_F(Parts, OfAConversionBecomeTheStoreOfOneCommand) {
+  write_file(path("v.raw"), noise(1100 * 40 * 20));
+  const Arguments convert{"convert", path("v.raw"), "--dims",  "1100,40,20",
+                          "--type",  "u8",          "--brick", "16"};
+  run_json(words(convert, {"--shard", "64", path("one.zarr")}));
+  const Arguments parts = words(convert, {"--shard", "64", path("p.zarr")});
+  EXPECT_EQ(run_json(words(parts, {"--part", "2/2"}))["output"], path("p.zarr.parts/2of2"));
+  expect_refused(run(words(parts, {"--join", "2"})), 2, {"no whole part 1;", "--part 1/2"});
+  run_json(words(parts, {"--part", "1/2"}));
+  const auto again = run_json(words(parts, {"--part", "1/2"}));
+  EXPECT_EQ(again["bricks"]["kept"], again["bricks"]["total"]);
+  run_json(words(parts, {"--join", "2"}));
+  expect_same(path("one.zarr"), path("p.zarr"));
+  EXPECT_FALSE(fs::exists(path("p.zarr.parts")));
+  expect_refused(run(words(parts, {"--part", "1/2"})), 2, {"p.zarr", "--force"});
+  expect_refused(run(words(parts, {"--part", "1/2", "--join", "2", "--force"})), 2, {"joined"});
+  EXPECT_EQ(run({"verify", path("p.zarr")}).exit_code, 0);
+}
+
 }  // namespace
 }  // namespace isobrick::test
