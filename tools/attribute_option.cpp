@@ -46,6 +46,15 @@ AttributeRequest parse_attribute(const std::string& text) {
   return request;
 }
 
+void add_attributes(CLI::App* app, std::vector<AttributeRequest>& attributes) {
+  add_repeated(
+      app,
+      {"--attribute", "NAME=STORE[:CHANNEL]",
+       "Sample another volume at the vertices, as a vertex attribute of PLY, VTP, PVTP or "
+       "GLB; may be repeated"},
+      [&attributes](const std::string& text) { attributes.push_back(parse_attribute(text)); });
+}
+
 AttributeVolumes::AttributeVolumes(const std::vector<AttributeRequest>& requests,
                                    const InputArguments& input, std::uint64_t memory, int threads,
                                    const std::string& unit, Console& console)
@@ -70,6 +79,12 @@ std::uint64_t AttributeVolumes::memory(const SampleOptions& options) const {
   if (empty()) return 0;
   FunctionSink nowhere([](const MeshChunk&) {});
   return AttributeSink(nowhere, attributes_, options).memory();
+}
+
+std::vector<std::string> names_of(const std::vector<AttributeRequest>& requests) {
+  std::vector<std::string> names;
+  for (const AttributeRequest& request : requests) names.push_back(request.name);
+  return names;
 }
 
 std::vector<fs::path> paths_of(const std::vector<AttributeRequest>& requests) {

@@ -23,6 +23,9 @@ struct AttributeRequest {
 /// a text without '=' or a name or path that is empty.
 AttributeRequest parse_attribute(const std::string& text);
 
+/// --attribute.
+void add_attributes(CLI::App* app, std::vector<AttributeRequest>& attributes);
+
 /// The volumes of all attributes of a mesh.
 class AttributeVolumes {
  public:
@@ -44,6 +47,8 @@ class AttributeVolumes {
   std::string unit_;
   int threads_;
 };
+
+std::vector<std::string> names_of(const std::vector<AttributeRequest>& requests);
 
 /// Inputs that no output may replace.
 std::vector<std::filesystem::path> paths_of(const std::vector<AttributeRequest>& requests);

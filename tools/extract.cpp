@@ -343,13 +343,7 @@ void add_extract(Program& program) {
            "Close the surface at the border of the volume or region and around missing samples (on "
            "the CPU)");
   add_filters(app, arguments->filters);
-  add_repeated(app,
-               {"--attribute", "NAME=STORE[:CHANNEL]",
-                "Sample another volume at the vertices, as a vertex attribute of PLY, VTP, PVTP or "
-                "GLB; may be repeated"},
-               [&attributes = arguments->attributes](const std::string& text) {
-                 attributes.push_back(parse_attribute(text));
-               });
+  add_attributes(app, arguments->attributes);
   add_text(
       app,
       {"--preset", "print",

@@ -24,6 +24,7 @@ using nlohmann::ordered_json;
 void check_part_arguments(const ExtractArguments& arguments) {
   const std::pair<bool, const char*> of_merge[] = {
       {filter_options(arguments.filters).any(), "a filter, --measure or --mesh-unit"},
+      {!arguments.attributes.empty(), "--attribute"},
       {arguments.format.has_value(), "--format"},
       {arguments.quantize, "--quantize"},
       {arguments.levels > 0, "--levels"},
@@ -37,7 +38,6 @@ void check_part_arguments(const ExtractArguments& arguments) {
       {arguments.labels.has_value(), "--labels"},
       {!arguments.preview.path.empty(), "--preview"},
       {arguments.estimate, "--estimate"},
-      {!arguments.attributes.empty(), "--attribute"},
       {arguments.backend == Backend::cuda, "--backend cuda"}};
   for (const auto& [is_given, name] : others)
     if (is_given) throw UsageError(fmt::format("--part: {} is not for parts: leave it out", name));

@@ -58,11 +58,7 @@ MeshForm form_of(const ExtractArguments& arguments) {
     throw UsageError(
         fmt::format("--quantize is for GLB only, and this mesh becomes {}", name_of(form.format)));
   check_levels(form);
-  if (form.attributes > 0 && !has_attributes(form.format))
-    throw UsageError(
-        fmt::format("--attribute: {} cannot hold attributes of vertices; choose PLY, VTP, PVTP or "
-                    "GLB",
-                    name_of(form.format)));
+  check_attribute_format(form);
   return form;
 }
 
@@ -179,8 +175,7 @@ std::vector<ExtractedSurface> surfaces_of_level(const ExtractArguments& argument
   const MeshForm form = form_of(arguments);
   MeshFilterOptions filter = filter_options(arguments.filters);
   filter.threads = arguments.threads;
-  std::vector<std::string> names;
-  for (const AttributeRequest& attribute : arguments.attributes) names.push_back(attribute.name);
+  const std::vector<std::string> names = names_of(arguments.attributes);
   std::vector<ExtractedSurface> surfaces;
   for (const double isovalue : isovalues) {
     options.isovalue = isovalue;
@@ -257,8 +252,7 @@ std::string shortage_text(const PlannedMesh& mesh, const Shortage& shortage, boo
 
 /// Refuses attributes that no file could hold.
 void check_attributes(const ExtractArguments& arguments) {
-  std::vector<std::string> names;
-  for (const AttributeRequest& attribute : arguments.attributes) names.push_back(attribute.name);
+  const std::vector<std::string> names = names_of(arguments.attributes);
   check_attribute_names(names);
   if (!names.empty() && !arguments.estimate && !arguments.writes_mesh())
     throw UsageError("--attribute: a picture has none; name a mesh with -o");

@@ -25,7 +25,6 @@ constexpr std::uint64_t kMaxPieces = 500;
 void check_resume_arguments(const ExtractArguments& arguments) {
   const std::pair<bool, const char*> others[] = {
       {!arguments.preview.path.empty(), "--preview"},
-      {!arguments.attributes.empty(), "--attribute"},
       {arguments.backend == Backend::cuda, "--backend cuda"}};
   for (const auto& [is_given, name] : others)
     if (is_given)
@@ -123,6 +122,7 @@ CommandOutput make_resumable(const ExtractArguments& arguments,
                                     .output = surface.output,
                                     .form = surface.form,
                                     .filter = surface.filter,
+                                    .attributes = arguments.attributes,
                                     .memory = arguments.memory,
                                     .threads = arguments.threads,
                                     .force = arguments.force,

@@ -31,6 +31,7 @@ struct MergeArguments {
   int levels = 0;
   bool sharded = false;
   FilterArguments filters;
+  std::vector<AttributeRequest> attributes;
   std::uint64_t memory = 0;
   int threads = 0;
   bool force = false, no_space_check = false;
@@ -44,8 +45,10 @@ fs::path default_output(const std::string& piece, MeshFormat format) {
 }
 
 MeshForm form_of(const MergeArguments& arguments) {
-  MeshForm form{
-      .quantize = arguments.quantize, .levels = arguments.levels, .sharded = arguments.sharded};
+  MeshForm form{.quantize = arguments.quantize,
+                .levels = arguments.levels,
+                .sharded = arguments.sharded,
+                .attributes = arguments.attributes.size()};
   if (arguments.format)
     form.format = *arguments.format;
   else if (!arguments.output.empty())
@@ -55,6 +58,7 @@ MeshForm form_of(const MergeArguments& arguments) {
     throw UsageError(
         fmt::format("--quantize is for GLB only, and this mesh becomes {}", name_of(form.format)));
   check_levels(form);
+  check_attribute_format(form);
   return form;
 }
 
@@ -73,19 +77,21 @@ void check_disk(const MergeJob& job, const PiecesInfo& info) {
 }
 
 /// Filters get half of what the pieces and the file do not need.
-std::uint64_t filter_memory(const MergeJob& job, const PiecesInfo& info, std::uint64_t of_file) {
+std::uint64_t filter_memory(const MergeJob& job, const PiecesInfo& info, std::uint64_t of_output) {
   constexpr std::uint64_t least = std::uint64_t{8} << 20;
-  const std::uint64_t needed = info.merge_memory + of_file + least;
+  const std::uint64_t needed = info.merge_memory + of_output + least;
   return least + (job.memory - std::min(job.memory, needed)) / 2;
 }
 
 /// The mesh with what it goes through.
 struct MergeSinks {
   std::unique_ptr<MeshSink> file;
+  std::unique_ptr<AttributeSink> attributes;  ///< null without any
   std::unique_ptr<MeshFilter> filter;
 };
 
-MergeSinks open_sinks(const MergeJob& job, const PiecesInfo& info, Progress& progress) {
+MergeSinks open_sinks(const MergeJob& job, const PiecesInfo& info,
+                      const AttributeVolumes& attributes, Progress& progress) {
   MergeSinks sinks;
   sinks.file = create_mesh_file(job.output, {.format = job.form.format,
                                              .quantize = job.form.quantize,
@@ -100,8 +106,14 @@ MergeSinks open_sinks(const MergeJob& job, const PiecesInfo& info, Progress& pro
   filter.threads = job.threads;
   filter.scratch_beside = job.output;
   filter.progress = &progress;
-  filter.memory = filter_memory(job, info, sinks.file->memory());
-  sinks.filter = std::make_unique<MeshFilter>(*sinks.file, filter);
+  MeshSink* output = sinks.file.get();
+  if (!attributes.empty()) {
+    sinks.attributes = std::make_unique<AttributeSink>(*output, attributes.attributes(),
+                                                       attributes.options(job.memory, 1));
+    output = sinks.attributes.get();
+  }
+  filter.memory = filter_memory(job, info, output->memory());
+  sinks.filter = std::make_unique<MeshFilter>(*output, filter);
   return sinks;
 }
 
@@ -123,6 +135,7 @@ ordered_json merge_json(const MergeJob& job, const MergeResult& made) {
   if (filtered.simplify_goal) object["simplify_goal"] = *filtered.simplify_goal;
   if (filtered.measure) object["measure"] = measure_json(*filtered.measure);
   if (!filtered.levels.empty()) object["levels"] = tools::levels_json(filtered.levels);
+  if (!job.attributes.empty()) object["attributes"] = names_of(job.attributes);
   object["peak_resident_bytes"] = peak_resident_bytes();
   return object;
 }
@@ -145,11 +158,13 @@ int run_merge(const MergeArguments& arguments, Console& console) {
   refuse_url_output(arguments.output);
   MergeJob job{.form = form_of(arguments),
                .filter = filter_options(arguments.filters),
+               .attributes = arguments.attributes,
                .memory = arguments.memory,
                .threads = arguments.threads,
                .force = arguments.force,
                .no_space_check = arguments.no_space_check};
   check_filters(arguments.filters, false);
+  check_attribute_names(names_of(arguments.attributes));
   job.pieces.assign(arguments.pieces.begin(), arguments.pieces.end());
   job.output = !arguments.output.empty()
                    ? fs::path(has_levels(job.form.format) ? without_slash(arguments.output)
@@ -166,9 +181,13 @@ int run_merge(const MergeArguments& arguments, Console& console) {
 MergeResult merge(MergeJob job, Console& console) {
   MergeResult made{.pieces = read_pieces(job.pieces)};
   job.form.normals = made.pieces.header.has_normals && has_normals(job.form.format);
-  check_replaces_no_input(job.output, job.pieces);
+  std::vector<fs::path> inputs = paths_of(job.attributes);
+  inputs.insert(inputs.end(), job.pieces.begin(), job.pieces.end());
+  check_replaces_no_input(job.output, inputs);
   check_disk(job, made.pieces);
-  const MergeSinks sinks = open_sinks(job, made.pieces, console.progress());
+  const AttributeVolumes attributes(job.attributes, {}, job.memory, job.threads,
+                                    made.pieces.header.unit, console);
+  const MergeSinks sinks = open_sinks(job, made.pieces, attributes, console.progress());
   {
     const Stopwatch watch(made.seconds);
     merge_pieces(job.pieces, *sinks.filter, {.normals = job.form.normals, .memory = job.memory},
@@ -210,6 +229,7 @@ void add_merge(Program& program) {
              {"--levels", "auto|N", "Levels of detail of neuroglancer's format at most", "auto"});
   add_flag(app, "--sharded", arguments->sharded, "neuroglancer's format in few large files");
   add_filters(app, arguments->filters);
+  add_attributes(app, arguments->attributes);
   add_memory(app, arguments->memory);
   add_threads(app, arguments->threads);
   add_force(app, arguments->force);

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include <isobrick/pieces.h>
+#include "tools/attribute_option.h"
 #include "tools/extract_report.h"
 #include "tools/filter_options.h"
 #include "tools/mesh_output.h"
@@ -19,6 +20,7 @@ struct MergeJob {
   std::filesystem::path output;
   MeshForm form;
   MeshFilterOptions filter;
+  std::vector<AttributeRequest> attributes;
   std::uint64_t memory = 0;
   int threads = 0;
   bool force = false, no_space_check = false;

@@ -54,6 +54,14 @@ void check_levels(const MeshForm& form) {
         name_of(form.format)));
 }
 
+void check_attribute_format(const MeshForm& form) {
+  if (form.attributes > 0 && !has_attributes(form.format))
+    throw UsageError(
+        fmt::format("--attribute: {} cannot hold attributes of vertices; choose PLY, VTP, PVTP or "
+                    "GLB",
+                    name_of(form.format)));
+}
+
 void check_can_write_mesh(const fs::path& path, MeshFormat format, bool force) {
   const fs::path name = without_slash(path);
   std::error_code none;

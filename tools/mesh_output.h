@@ -29,6 +29,9 @@ MeshFormat parse_mesh_format(const std::string& text);
 /// Throws UsageError for levels of detail and shards that the format has not.
 void check_levels(const MeshForm& form);
 
+/// Throws UsageError for attributes that the format cannot hold.
+void check_attribute_format(const MeshForm& form);
+
 /// Throws as check_can_write(), and for a folder where it exists and `force` is not set.
 void check_can_write_mesh(const std::filesystem::path& path, MeshFormat format, bool force);
 

@@ -111,6 +111,7 @@ def run_commands(check):
               "--drop-degenerate", "-o", "a.piece")
     for options in ([], ["--simplify", "50%", "--measure"]):
         check.run("merge", "merge", "a.piece", "-o", "p.ply", "--force", *options)
+    check.run("merge", "merge", "a.piece", "-o", "a.vtp", "--attribute", "c=c.zarr")
     check.run("merge", "merge", "a.piece", "-o", "p.stl")
     check.run("synth", "synth", "cells", "cells.zarr", "--dims", "30,30,30", "--type", "u8")
     check.run("extract_labels", "extract", "cells.zarr", "--labels", "all", "-o", "meshes",

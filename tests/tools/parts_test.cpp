@@ -123,6 +123,21 @@ TEST_F(Parts, AreFilteredWhenTheyAreMerged) {
   }
 }
 
+TEST_F(Parts, GetAttributesWhenTheyAreMerged) {
+  run_json({"synth", "sphere", path("s.zarr"), "--dims", "100,91,77", "--type", "f32"});
+  const Arguments attribute{"--attribute", "distance=" + path("s.zarr"), "--smooth", "2"};
+  run_json(extract(words({"-o", path("one.ply")}, attribute)));
+  const auto made = merge(make_pieces(3), words({"-o", path("parts.ply")}, attribute));
+  EXPECT_EQ(made["attributes"], (Arguments{"distance"}));
+  expect_same(path("one.ply"), path("parts.ply"));
+  run_json(extract(words({"-o", path("resumed.ply"), "--resume"}, attribute)));
+  expect_same(path("one.ply"), path("resumed.ply"));
+  const Arguments alone{"--attribute", "distance=" + path("s.zarr")};
+  expect_refused(run(extract(words({"--part", "1/2"}, alone))), 2, {"isobrick merge"});
+  expect_refused(run(words({"merge", path("p1.piece"), "-o", path("a.stl")}, alone)), 2,
+                 {"--attribute", "STL"});
+}
+
 TEST_F(Parts, HaveNamesOfTheirOwn) {
   const fs::path before = fs::current_path();
   fs::current_path(path(""));
