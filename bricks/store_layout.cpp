@@ -23,6 +23,14 @@ nlohmann::json marker_json(const StoreLayout& layout) {
   return marker;
 }
 
+/// The root's file of another store with the checksum of this one.
+std::string kept_root(const std::string& root, bool v2, std::optional<std::uint32_t> checksum) {
+  auto json = nlohmann::ordered_json::parse(root);
+  json.erase("consolidated_metadata");  // which may list the codecs of the other one
+  if (checksum) (v2 ? json : json.at("attributes")).at("isobrick")["metadata_crc32c"] = *checksum;
+  return json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
+}
+
 }  // namespace
 
 ArrayMetadata array_metadata(const LevelInfo& level, const StoreLayout& layout) {
@@ -54,8 +62,11 @@ ImageMetadata image_metadata(const StoreLayout& layout) {
   return image;
 }
 
-RootFile root_file(const ImageMetadata& image, OmeVersion ome) {
-  if (ome == OmeVersion::v04) return {".zattrs", to_zattrs(image)};
+RootFile root_file(const ImageMetadata& image, const StoreLayout& layout) {
+  const bool v2 = layout.ome == OmeVersion::v04;
+  if (!layout.root.empty())
+    return {v2 ? ".zattrs" : "zarr.json", kept_root(layout.root, v2, image.checksum)};
+  if (v2) return {".zattrs", to_zattrs(image)};
   return {"zarr.json", to_json(image)};
 }
 
@@ -109,7 +120,7 @@ std::uint32_t layout_checksum(const ImageMetadata& image, const StoreLayout& lay
     const ArrayMetadata array = array_metadata(level, layout);
     arrays.push_back(v2 ? v3_from_zarray(to_zarray(array), where) : to_json(array));
   }
-  const std::string root = root_file(image, layout.ome).json;
+  const std::string root = root_file(image, layout).json;
   return metadata_checksum(v2 ? v3_from_zattrs(root, where) : root, arrays, where);
 }
 

@@ -29,6 +29,9 @@ struct StoreLayout {
   std::string grid_class;            ///< as OpenVDB calls it, or empty
   std::string grid_name;             ///< of the OpenVDB grid, or empty
   std::optional<LabelTable> labels;  ///< as VolumeInfo::labels
+  /// Of a store that is written once more: the text of its root's file, which is kept but for the
+  /// checksum. The members above state the same. Empty: the file is made of them.
+  std::string root;
 
   CodecChain codecs() const { return CodecChain::of(codec, zstd_level, ome == OmeVersion::v04); }
 };
@@ -55,7 +58,7 @@ struct RootFile {
   const char* name;
   std::string json;
 };
-RootFile root_file(const ImageMetadata& image, OmeVersion ome);
+RootFile root_file(const ImageMetadata& image, const StoreLayout& layout);
 
 /// metadata_checksum() of the metadata that a reader of the store will find. `where` names the
 /// root's file.

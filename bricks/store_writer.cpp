@@ -336,12 +336,25 @@ void StoreWriter::put_block_ranges(int level, Box3 box, std::span<const std::byt
   impl_->level(level).block_ranges->put(box, pairs);
 }
 
+void StoreWriter::copy_ranges(int level, const StoreReader& store,
+                              const RangeChecksums& checksums) {
+  Impl::Level& l = impl_->level(level);
+  const std::string& additions = store.info().additions;
+  const auto copy = [&](const std::string& folder, Int3 items, std::uint32_t crc32c,
+                        ItemArrayWriter& to) {
+    const ArrayMetadata array = range_array_metadata(items, l.lattice.type);
+    ItemArrayReader(store.storage(), folder, items, array, crc32c).copy_to(to);
+  };
+  copy(brick_range_folder(additions, level), l.lattice.bricks(), checksums.bricks, *l.brick_ranges);
+  copy(block_range_folder(additions, level), l.lattice.blocks(), checksums.blocks, *l.block_ranges);
+}
+
 void StoreWriter::put_histogram(const SampleCounts& counts) {
   impl_->histogram = write_histogram(impl_->dir / histogram_folder(""), counts, *impl_->publisher);
 }
 
 void StoreWriter::Impl::publish_root(const ImageMetadata& image) {
-  const RootFile file = root_file(image, layout.ome);
+  const RootFile file = root_file(image, layout);
   const std::filesystem::path root = dir / file.name;
   publisher->sync(publisher->write_temporary(root, std::as_bytes(std::span(file.json))));
   publisher->wait();
@@ -383,7 +396,7 @@ void StoreWriter::finish(bool may_have_nan,
   image.may_have_nan = may_have_nan;
   if (layout.ome == OmeVersion::v04) publisher.write(impl_->dir / ".zgroup", zgroup_json());
   image.checksum =
-      layout_checksum(image, layout, quoted(impl_->dir / root_file(image, layout.ome).name));
+      layout_checksum(image, layout, quoted(impl_->dir / root_file(image, layout).name));
   ranges.image_crc32c = *image.checksum;
   if (ranges.levels.size() == impl_->levels.size())
     publisher.write(impl_->dir / ranges_file(""), to_json(ranges));

@@ -10,7 +10,9 @@
 
 #include <isobrick/image_metadata.h>
 #include <isobrick/lattice.h>
+#include <isobrick/store_reader.h>
 #include "bricks/ranges/stored_histogram.h"
+#include "bricks/ranges/stored_ranges.h"
 #include "bricks/store_layout.h"
 
 namespace isobrick::inline v0 {
@@ -59,6 +61,10 @@ class StoreWriter {
   /// ranges. Thread-safe.
   void put_brick_ranges(int level, Box3 box, std::span<const std::byte> pairs);
   void put_block_ranges(int level, Box3 box, std::span<const std::byte> pairs);
+
+  /// In place of both: those of another store that has the same samples, byte for byte. Throws
+  /// DamageError where they are damaged.
+  void copy_ranges(int level, const StoreReader& store, const RangeChecksums& checksums);
 
   /// The histogram of level 0. A store to which none is given, or that has no ranges, keeps none.
   void put_histogram(const SampleCounts& counts);

@@ -68,6 +68,15 @@ void ItemArrayWriter::put(Box3 box, std::span<const std::byte> items) {
   });
 }
 
+void ItemArrayWriter::put_encoded_chunk(Int3 c, std::span<const std::byte> encoded) {
+  {
+    const std::lock_guard lock(mutex_);
+    complete_[number(c)] = true;
+    ++complete_count_;
+  }
+  write_encoded(c, encoded);
+}
+
 void ItemArrayWriter::fill_below(Index z) {
   const Index layers = z >= items_.z ? chunk_grid_.z : z / chunk_extent_.z;
   std::vector<std::byte> zeros;  // encoded
@@ -153,16 +162,14 @@ void ItemArrayReader::read_checksums(std::uint32_t expected) {
 
 void ItemArrayReader::check_box(Box3 box) const { check_box_within(box, items_); }
 
-std::vector<std::byte> ItemArrayReader::read_chunk(Int3 c,
-                                                   std::atomic<std::uint64_t>& bytes_read) const {
+ItemArrayReader::ReadChunk ItemArrayReader::read(Int3 c) const {
   if (!wrong_.empty()) throw DamageError(wrong_);
   const std::size_t size = chunk_bytes(array_);
   const std::string key = join_key(folder_, chunk_name(array_, c));
-  const auto content = read_small_object(*storage_, key, 2 * size + 1024);
+  auto content = read_small_object(*storage_, key, 2 * size + 1024);
   // Chunks are written even where all items are alike, so none may be missing.
   if (!content) throw DamageError(quoted(*storage_, key) + " is missing");
   const auto encoded = std::as_bytes(std::span(*content));
-  bytes_read += encoded.size();
   std::vector<std::byte> decoded(size);
   try {
     decode_bytes(array_.codecs, size_of(array_.type), encoded, decoded);
@@ -172,7 +179,21 @@ std::vector<std::byte> ItemArrayReader::read_chunk(Int3 c,
   const Int3 grid = ceil_div(items_, chunk_extent());
   if (last_checksum(encoded) != checksums_[static_cast<std::size_t>(linear_index(c, grid))])
     throw DamageError(quoted(*storage_, key) + " is the chunk of another place, level or store");
-  return decoded;
+  return {std::move(*content), std::move(decoded)};
+}
+
+std::vector<std::byte> ItemArrayReader::read_chunk(Int3 c,
+                                                   std::atomic<std::uint64_t>& bytes_read) const {
+  ReadChunk chunk = read(c);
+  bytes_read += chunk.encoded.size();
+  return std::move(chunk.decoded);
+}
+
+void ItemArrayReader::copy_to(ItemArrayWriter& writer) const {
+  for_each_point({{0, 0, 0}, ceil_div(items_, chunk_extent())}, [&](Int3 c) {
+    const ReadChunk chunk = read(c);
+    writer.put_encoded_chunk(c, std::as_bytes(std::span(chunk.encoded)));
+  });
 }
 
 }  // namespace isobrick

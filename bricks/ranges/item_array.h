@@ -30,6 +30,9 @@ class ItemArrayWriter {
 
   /// Items of `box`, C order [z, y, x]; each item exactly once.
   void put(Box3 box, std::span<const std::byte> items);
+  /// A chunk as it is encoded, of the array of another store with the same items; in place of
+  /// putting them.
+  void put_encoded_chunk(Int3 c, std::span<const std::byte> encoded);
   /// Items that were not put are zeros, in all chunks that end at or below `z` (in items).
   void fill_below(Index z);
   /// Writes the chunks' checksums and the metadata if there are items at all; the checksum of
@@ -79,8 +82,15 @@ class ItemArrayReader {
   /// A chunk's items. Throws DamageError naming the file when it is missing, damaged, or a chunk of
   /// another place or store.
   std::vector<std::byte> read_chunk(Int3 c, std::atomic<std::uint64_t>& bytes_read) const;
+  /// Checks all chunks, as read_chunk() does, and hands them on as they are.
+  void copy_to(ItemArrayWriter& writer) const;
 
  private:
+  struct ReadChunk {
+    std::string encoded;
+    std::vector<std::byte> decoded;
+  };
+  ReadChunk read(Int3 c) const;
   void read_checksums(std::uint32_t crc32c);
 
   std::shared_ptr<const Storage> storage_;
