@@ -6,11 +6,16 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include <isobrick/error.h>
+#include <isobrick/recode.h>
 #include <isobrick/store_reader.h>
 #include "bricks/stored_index.h"
 #include "bricks/zarr/label_metadata.h"
 #include "bricks/zarr/metadata_files.h"
 #include "io/bytes/folder_walk.h"
+#include "pipeline/convert/codec_choice.h"
+#include "pipeline/workers.h"
+#include "tools/codec_report.h"
 #include "tools/format.h"
 #include "tools/histogram.h"
 #include "tools/info_source.h"
@@ -25,6 +30,13 @@ namespace {
 
 namespace fs = std::filesystem;
 using nlohmann::ordered_json;
+
+struct InfoArguments {
+  InputArguments input;
+  bool stats = false;
+  std::uint64_t memory = 0;
+  int threads = 0;
+};
 
 /// Of a store in a folder or a zip.
 std::uint64_t bytes_of(const fs::path& path) {
@@ -103,6 +115,8 @@ struct StoreFacts {
   std::string no_histogram;  ///< why there is none
   std::vector<IndexFacts> indexes;
   std::vector<std::string> label_images;  ///< in its group `labels`
+  std::optional<CodecSample> codec_sample;
+  std::string codec_advice;  ///< empty without --stats
 
   std::optional<double> ratio() const {
     if (!bytes) return std::nullopt;
@@ -118,7 +132,25 @@ void read_values(const StoreReader& store, std::uint64_t memory, Progress& progr
   if (facts.no_histogram.empty()) facts.histogram = histogram(store, progress);
 }
 
-StoreFacts gather(const StoreReader& store, bool stats, std::uint64_t memory, Progress& progress) {
+/// Of larger bricks even a few are many bytes.
+constexpr std::size_t kMaxSampledBrick = std::size_t{64} << 20;
+
+/// Damage is for `verify` to report.
+void compare_codecs(const StoreReader& store, const InfoArguments& arguments, StoreFacts& facts) {
+  const Lattice& lattice = store.info().levels.front().lattice;
+  if (lattice.brick_bytes() > kMaxSampledBrick) return;
+  constexpr int kLevel = 3;
+  const int threads =
+      sampling_threads(lattice, kLevel, arguments.memory, Workers(arguments.threads).threads());
+  try {
+    facts.codec_sample = sample_codecs(store, kLevel, threads);
+    facts.codec_advice = codec_advice(store, *facts.codec_sample);
+  } catch (const DamageError&) {
+  }
+}
+
+StoreFacts gather(const StoreReader& store, const InfoArguments& arguments, Progress& progress) {
+  const bool stats = arguments.stats;
   const StoreInfo& info = store.info();
   const Lattice& finest = info.levels.front().lattice;
   StoreFacts facts;
@@ -137,8 +169,9 @@ StoreFacts gather(const StoreReader& store, bool stats, std::uint64_t memory, Pr
     facts.range = {stored->lo, stored->hi};
     facts.histogram = rebin(*stored, kColumns);
   } else if (stats) {
-    read_values(store, memory, progress, facts);
+    read_values(store, arguments.memory, progress, facts);
   }
+  if (stats) compare_codecs(store, arguments, facts);
   return facts;
 }
 
@@ -194,6 +227,9 @@ ordered_json json_of(const std::string& path, const StoreInfo& info, const Store
       {"direction", finest.transform.direction},
       {"unit", finest.transform.unit},
       {"codec", info.codec},
+      {"codec_sample", codec_sample_json(facts.codec_sample)},
+      {"codec_advice",
+       facts.codec_advice.empty() ? ordered_json(nullptr) : ordered_json(facts.codec_advice)},
       {"fill_value", info.fill_value},
       {"grid_class", info.grid_class},
       {"grid_name", info.grid_name},
@@ -247,6 +283,12 @@ std::string indexes_text(const StoreFacts& facts) {
   return text;
 }
 
+std::string codec_text(const StoreInfo& info, const StoreFacts& facts) {
+  std::string text = fmt::format("codec        {}", info.codec);
+  if (!facts.codec_advice.empty()) text += "; " + facts.codec_advice;
+  return text + '\n';
+}
+
 std::string bytes_text(const StoreFacts& facts) {
   if (!facts.bytes)
     return fmt::format("bytes        with --stats, for {} of samples\n",
@@ -287,20 +329,13 @@ std::string text_of(const std::string& path, const StoreInfo& info, const StoreF
   if (!facts.label_images.empty())
     text += fmt::format("label images {}\n", fmt::join(facts.label_images, ", "));
   text += levels_text(info, facts);
-  text += fmt::format("codec        {}\n", info.codec);
+  text += codec_text(info, facts);
   text += bytes_text(facts) + range_text(info, facts) + indexes_text(facts);
   return text + histogram_text(info, facts);
 }
 
-struct InfoArguments {
-  InputArguments input;
-  bool stats = false;
-  std::uint64_t memory = 0;
-  int threads = 0;
-};
-
 void report(const StoreReader& store, const InfoArguments& arguments, Console& console) {
-  const StoreFacts facts = gather(store, arguments.stats, arguments.memory, console.progress());
+  const StoreFacts facts = gather(store, arguments, console.progress());
   const std::string& path = arguments.input.path;
   console.result(json_of(path, store.info(), facts), text_of(path, store.info(), facts));
 }

@@ -38,6 +38,8 @@ nlohmann::ordered_json json_of(const InputArguments& input, const VolumeInfo& in
           {"direction", info.transform.direction},
           {"unit", info.transform.unit},
           {"codec", nullptr},
+          {"codec_sample", nullptr},
+          {"codec_advice", nullptr},
           {"fill_value", info.fill_value},
           {"grid_class", info.grid_class},
           {"grid_name", info.grid_name},

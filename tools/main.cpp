@@ -33,6 +33,7 @@ void define(Program& program) {
   add_extract(program);
   add_merge(program);
   add_export(program);
+  add_recode(program);
   add_render(program);
   add_view(program);
   add_synth(program);

@@ -11,6 +11,7 @@
 #include "bricks/zarr/store_names.h"
 #include "core/machine_memory.h"
 #include "pipeline/convert/convert_staging.h"
+#include "tools/codec_report.h"
 #include "tools/format.h"
 #include "tools/index_options.h"
 #include "tools/interrupt.h"
@@ -213,6 +214,22 @@ void add_selection(CLI::App* app, Selection& selection) {
              {"--time", "T", "Which time of an input that has several, from 0"});
 }
 
+void add_codec(CLI::App* app, BrickCodec& codec, int& zstd_level, double& packed_factor,
+               const std::string& fallback) {
+  add_text(
+      app,
+      {"--codec", "zstd:LEVEL|packed|none|auto:FACTOR",
+       "Compression of bricks; packed: decoded many times faster, but by Isobrick alone; auto: "
+       "packed where it takes at most FACTOR (1.1) times the bytes of zstd in some bricks",
+       fallback},
+      [&](const std::string& text) {
+        const Compression compression = parse_codec(text);
+        codec = compression.codec;
+        zstd_level = compression.zstd_level;
+        packed_factor = compression.packed_factor;
+      });
+}
+
 void add_store_options(CLI::App* app, ConvertOptions& options) {
   add_parsed(app, options.brick, [](const std::string& text) { return parse_whole(text, 16, 256); },
              {"--brick", "N", "Samples along each edge of a brick, 16 to 256",
@@ -221,15 +238,7 @@ void add_store_options(CLI::App* app, ConvertOptions& options) {
              [](const std::string& text) { return parse_whole(text, 16, 1 << 20); },
              {"--shard", "N", "Samples along each edge of a shard, cut to a multiple of the brick",
               "512; in thin volumes as many bricks in longer shards"});
-  add_text(
-      app,
-      {"--codec", "zstd:LEVEL|packed|none",
-       "Compression of bricks; packed: decoded many times faster, but by Isobrick alone", "zstd:3"},
-      [&options](const std::string& text) {
-        const Compression compression = parse_codec(text);
-        options.codec = compression.codec;
-        options.zstd_level = compression.zstd_level;
-      });
+  add_codec(app, options.codec, options.zstd_level, options.packed_factor, "zstd:3");
   add_parsed(app, options.levels, parse_levels,
              {"--levels", "auto|N", "Levels of the pyramid; auto: until one brick holds the last",
               "auto"});
@@ -297,6 +306,9 @@ void report_conversion(Console& console, const std::string& command, const std::
       {"bytes_out", report.bytes_out},
       {"index_bytes", report.index_bytes},
       {"ratio", ratio},
+      {"codec", report.codec.empty() ? nlohmann::ordered_json(nullptr)
+                                     : nlohmann::ordered_json(report.codec)},
+      {"codec_sample", codec_sample_json(report.codec_sample)},
       {"seconds", report.seconds},
       {"index_seconds", report.index_seconds},
       {"notes", notes},
@@ -311,6 +323,8 @@ void report_conversion(Console& console, const std::string& command, const std::
   text += fmt::format("\n{} in, {} out ({:.2f} to 1) in {}, {}/s\n", human_bytes(report.bytes_in),
                       human_bytes(report.bytes_out), ratio, human_seconds(report.seconds),
                       human_bytes(rate));
+  if (report.codec_sample)
+    text += fmt::format("codec {}: {}\n", report.codec, codec_sample_text(*report.codec_sample));
   if (report.index_bytes > 0)
     text += fmt::format("of that {} for the index, in {}\n", human_bytes(report.index_bytes),
                         human_seconds(report.index_seconds));

@@ -41,6 +41,7 @@ void add_verify(Program& program);
 void add_extract(Program& program);
 void add_merge(Program& program);
 void add_export(Program& program);
+void add_recode(Program& program);
 void add_synth(Program& program);
 void add_render(Program& program);
 void add_view(Program& program);
@@ -125,6 +126,10 @@ void add_clip(CLI::App* app, std::vector<HalfSpace>& planes);
 void add_inside(CLI::App* app, std::optional<Inside>& inside);
 /// --channel and --time.
 void add_selection(CLI::App* app, Selection& selection);
+
+/// --codec. The other three must live as long as the program's definitions.
+void add_codec(CLI::App* app, BrickCodec& codec, int& zstd_level, double& packed_factor,
+               const std::string& fallback);
 
 /// How a store is written: what `convert` and `synth` share.
 void add_store_options(CLI::App* app, ConvertOptions& options);

@@ -179,13 +179,26 @@ ByteOrder parse_byte_order(std::string_view text) {
   throw UsageError(fmt::format("'{}' is no byte order; it is little or big", text));
 }
 
+namespace {
+
+double parse_factor(std::string_view text) {
+  const double factor = parse_number(text);
+  if (factor > 0 && std::isfinite(factor)) return factor;
+  throw UsageError(fmt::format("a factor of '{}': it is a positive number, such as 1.1", text));
+}
+
+}  // namespace
+
 Compression parse_codec(std::string_view text) {
   constexpr std::string_view zstd = "zstd";
   if (text == "none") return {BrickCodec::none};
   if (text == "packed") return {BrickCodec::packed};
   if (text == zstd) return {};
+  if (text == "auto") return {BrickCodec::automatic};
+  if (text.starts_with("auto:")) return {BrickCodec::automatic, 3, parse_factor(text.substr(5))};
   if (!text.starts_with("zstd:"))
-    throw UsageError(fmt::format("unknown codec '{}'; it is zstd:LEVEL, packed or none", text));
+    throw UsageError(
+        fmt::format("unknown codec '{}'; it is zstd:LEVEL, packed, none or auto:FACTOR", text));
   return {BrickCodec::zstd, parse_int(text.substr(zstd.size() + 1), 1, 22)};
 }
 

@@ -89,9 +89,10 @@ ByteOrder parse_byte_order(std::string_view text);
 struct Compression {
   BrickCodec codec = BrickCodec::zstd;
   int zstd_level = 3;
+  double packed_factor = kMaxPackedFactor;  ///< of automatic
 };
 
-/// "none", "packed", "zstd" or "zstd:LEVEL".
+/// "none", "packed", "zstd", "zstd:LEVEL", "auto" or "auto:FACTOR".
 Compression parse_codec(std::string_view text);
 
 /// "auto" (nothing) or a number of levels.

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <optional>
 #include <stop_token>
+#include <string>
 #include <vector>
 
 #include <isobrick/api.h>
@@ -25,9 +26,12 @@ struct ConvertOptions {
   /// Samples along each edge of a shard, a multiple of `brick`. Nothing: the same with a cube of
   /// 512.
   std::optional<Index> shard = {};
-  BrickCodec codec = BrickCodec::zstd;  ///< packed needs OME-Zarr 0.5
-  int zstd_level = 3;                   ///< of zstd, 1 … 22
-  std::optional<int> levels = {};       ///< nothing: until one brick holds the coarsest
+  /// packed needs OME-Zarr 0.5; of 0.4 automatic is zstd. With automatic a stream is copied to a
+  /// temporary file beside the store first, as large as its samples.
+  BrickCodec codec = BrickCodec::zstd;
+  int zstd_level = 3;                       ///< of zstd, 1 … 22
+  double packed_factor = kMaxPackedFactor;  ///< of automatic: see kMaxPackedFactor
+  std::optional<int> levels = {};           ///< nothing: until one brick holds the coarsest
   /// From a level to the next, 1 or 2 an axis: of each step in turn, the last one of all further
   /// steps. Nothing: factors_by_spacing().
   std::vector<Int3> factors = {};
@@ -63,6 +67,10 @@ struct ConvertReport {
   std::uint64_t index_bytes = 0;    ///< part of bytes_out
   double seconds = 0;               ///< wall time of the conversion, the index included
   double index_seconds = 0;         ///< wall time of the index
+  std::string codec;                ///< of the bricks, as StoreInfo::codec
+  /// What BrickCodec::automatic was chosen by. Nothing: the codec was given, OME-Zarr 0.4 left no
+  /// choice, or a resume goes on with the codec of the interrupted conversion.
+  std::optional<CodecSample> codec_sample = {};
 };
 
 /// Writes `source` as a store at `out`: works in `out` + ".partial" and renames

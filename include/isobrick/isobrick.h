@@ -22,6 +22,7 @@
 #include <isobrick/part.h>
 #include <isobrick/pieces.h>
 #include <isobrick/progress.h>
+#include <isobrick/recode.h>
 #include <isobrick/store_reader.h>
 #include <isobrick/synth_source.h>
 #include <isobrick/verify.h>

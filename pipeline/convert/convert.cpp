@@ -5,10 +5,12 @@
 #include <optional>
 #include <vector>
 
+#include <isobrick/error.h>
 #include "bricks/store_writer.h"
 #include "core/cancellable_progress.h"
 #include "core/stopwatch.h"
 #include "pipeline/check_part.h"
+#include "pipeline/convert/codec_choice.h"
 #include "pipeline/convert/convert_cascade.h"
 #include "pipeline/convert/convert_join.h"
 #include "pipeline/convert/convert_journal.h"
@@ -37,6 +39,37 @@ IndexOptions index_options(const ConvertOptions& options, bool resume) {
           .threads = options.threads,
           .resume = resume,
           .force = true};
+}
+
+/// Whether the codec is still to be chosen. Throws UsageError for parts, which are made by tasks
+/// that know nothing of each other.
+bool has_choice(const ConvertOptions& options) {
+  if (options.codec != BrickCodec::automatic || options.ome == OmeVersion::v04) return false;
+  if (options.part || options.join > 0)
+    throw UsageError(
+        "parts of a store need the same codec: name zstd, packed or none in place of auto");
+  return true;
+}
+
+/// Copies a stream to a temporary file beside the store, some planes at a time.
+std::unique_ptr<SpooledVolume> spool_stream(VolumeSource& source,
+                                            const std::filesystem::path& beside, Index planes,
+                                            Progress& progress) {
+  const VolumeInfo& info = source.info();
+  auto spooled = std::make_unique<SpooledVolume>(beside, info);
+  planes = std::min(planes, info.extent.z);
+  Box3 box{{0, 0, 0}, {info.extent.x, info.extent.y, 0}};
+  const auto buffer = std::make_unique_for_overwrite<std::byte[]>(
+      bytes_of({info.extent.x, info.extent.y, planes}, info.type));
+  progress.begin("spool", bytes_of(info.extent, info.type));
+  for (; box.lo.z < info.extent.z; box.lo.z = box.hi.z) {
+    box.hi.z = std::min(box.lo.z + planes, info.extent.z);
+    source.read(box, buffer.get());
+    spooled->write(box, buffer.get());
+    progress.advance(bytes_of(box.extent(), info.type));
+  }
+  progress.end();
+  return spooled;
 }
 
 /// One conversion into a staging directory.
@@ -72,7 +105,6 @@ class Conversion {
   void write_levels(int first_level, VolumeSource& source);
   void write_cascade(int first_level, VolumeSource& source);
   std::unique_ptr<SpooledVolume> write_in_pieces(int level, VolumeSource& source);
-  std::unique_ptr<SpooledVolume> spool_stream();
 
   VolumeSource& source_;
   const StoreLayout& layout_;
@@ -142,7 +174,8 @@ void Conversion::add_chosen_index(ConvertReport& report) {
 /// `source` is of the first level.
 void Conversion::write_levels(int first_level, VolumeSource& source) {
   std::unique_ptr<SpooledVolume> spooled;
-  if (!source.random_access() && !plan_->cascade_fits(0)) spooled = spool_stream();
+  if (!source.random_access() && !plan_->cascade_fits(0))
+    spooled = spool_stream(source_, staging_.path(), plan_->spool_planes(), progress_);
   progress_.begin("convert",
                   first_level == 0 ? bytes_of(source.info().extent, source.info().type) : 0);
   for (int level = first_level; level < level_count(); ++level) {
@@ -202,35 +235,19 @@ std::unique_ptr<SpooledVolume> Conversion::write_in_pieces(int level, VolumeSour
   return next;
 }
 
-std::unique_ptr<SpooledVolume> Conversion::spool_stream() {
-  const VolumeInfo& info = source_.info();
-  auto spooled = std::make_unique<SpooledVolume>(staging_.path(), info);
-  const Index planes = std::min(plan_->spool_planes(), info.extent.z);
-  Box3 box{{0, 0, 0}, {info.extent.x, info.extent.y, 0}};
-  const auto buffer = std::make_unique_for_overwrite<std::byte[]>(
-      bytes_of({info.extent.x, info.extent.y, planes}, info.type));
-  progress_.begin("spool", bytes_of(info.extent, info.type));
-  for (; box.lo.z < info.extent.z; box.lo.z = box.hi.z) {
-    box.hi.z = std::min(box.lo.z + planes, info.extent.z);
-    source_.read(box, buffer.get());
-    spooled->write(box, buffer.get());
-    progress_.advance(bytes_of(box.extent(), info.type));
-  }
-  progress_.end();
-  return spooled;
-}
-
 }  // namespace
 
 ConvertReport convert(VolumeSource& source, const std::filesystem::path& out,
                       const ConvertOptions& options, Progress& listener) {
   CancellableProgress progress(listener, options.cancel);
   Stopwatch watch;
-  const StoreLayout layout = plan_layout(source.info(), options, source.sparse());
+  const bool choose = has_choice(options);
+  StoreLayout layout = plan_layout(source.info(), options, source.sparse());
   if (options.part) {
     check_part(*options.part);
     check_part_output(out, options);
     ConvertReport report = convert_part(source, layout, out, options, progress);
+    report.codec = layout.codecs().name();
     report.seconds = watch.lap();
     return report;
   }
@@ -238,13 +255,17 @@ ConvertReport convert(VolumeSource& source, const std::filesystem::path& out,
   const std::uint64_t index_memory =
       options.index ? min_index_memory(index_options(options, false), finest) : 0;
   const int threads = Workers(options.threads).threads();
+  const int samplers =
+      choose ? sampling_threads(finest, layout.zstd_level, options.memory, threads) : 0;
   std::optional<ConvertPlan> plan;
   std::optional<SparsePyramid> sparse;
   if (options.join == 0 && SparsePyramid::possible(source, layout))
     sparse.emplace(source, layout, options, threads, index_memory);
   else
-    plan.emplace(layout, options.memory, threads, source.random_access() || options.join > 0,
-                 source.memory(), index_memory);
+    plan.emplace(
+        layout, options.memory, threads, source.random_access() || options.join > 0,
+        source.memory() + (choose ? sampling_bytes(finest, layout.zstd_level, samplers) : 0),
+        index_memory);
   if (options.index) check_index_options(index_options(options, false), finest);
   std::vector<std::filesystem::path> inputs = options.inputs;
   inputs.insert(inputs.end(), source.info().files.begin(), source.info().files.end());
@@ -253,12 +274,25 @@ ConvertReport convert(VolumeSource& source, const std::filesystem::path& out,
   // What an interrupted join has moved is not in the parts any more.
   ConvertStaging staging(out, options.resume || joined, options.force, std::move(inputs));
   Workers workers(plan ? plan->threads() : sparse->threads());
+  std::unique_ptr<SpooledVolume> spooled;
+  std::optional<CodecSample> sample;
   ConvertReport report = workers.execute([&] {
-    return Conversion(source, layout, plan ? &*plan : nullptr, sparse ? &*sparse : nullptr,
-                      joined ? &*joined : nullptr, staging, options, progress)
+    if (choose && staging.resumed()) take_begun_codec(staging.path(), layout);
+    // What a stream is like shows at its end only, and it can be read once.
+    if (choose && !staging.resumed() && !source.random_access())
+      spooled = spool_stream(source, staging.path(), plan->spool_planes(), progress);
+    if (choose && !staging.resumed()) {
+      sample = sample_source(spooled ? *spooled : source, layout, samplers, options.memory);
+      layout.codec = better_codec(*sample, options.packed_factor);
+    }
+    return Conversion(spooled ? *spooled : source, layout, plan ? &*plan : nullptr,
+                      sparse ? &*sparse : nullptr, joined ? &*joined : nullptr, staging, options,
+                      progress)
         .run();
   });
   if (joined) joined->remove();
+  report.codec = layout.codecs().name();
+  report.codec_sample = sample;
   report.seconds = watch.lap();
   return report;
 }

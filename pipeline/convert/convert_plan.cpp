@@ -10,6 +10,7 @@
 #include "bricks/ranges/brick_checksums.h"
 #include "bricks/ranges/range_format.h"
 #include "bricks/zarr/codec.h"
+#include "pipeline/convert/codec_choice.h"
 #include "pipeline/convert/downsample.h"
 #include "pipeline/index/range_scan.h"
 #include "pipeline/index/value_counts.h"
@@ -133,10 +134,7 @@ void check_options(const VolumeInfo& volume, const ConvertOptions& options) {
   if (shard < brick)
     throw UsageError(
         fmt::format("shards of {}³ samples are smaller than bricks of {}³", shard, brick));
-  if (options.zstd_level < 1 || options.zstd_level > 22)
-    throw UsageError(fmt::format("zstd level {}: 1 to 22 are possible", options.zstd_level));
-  if (options.codec == BrickCodec::packed && options.ome == OmeVersion::v04)
-    throw UsageError("the codec 'packed' needs OME-Zarr 0.5: 0.4 has no name for it");
+  check_codec(options.codec, options.zstd_level, options.packed_factor, options.ome);
   if (options.threads < 0) throw UsageError(fmt::format("{} threads", options.threads));
   if (options.levels && (*options.levels < 1 || *options.levels > kMaxLevels))
     throw UsageError(fmt::format("{} levels: 1 to {} are possible", *options.levels, kMaxLevels));
@@ -152,7 +150,8 @@ void check_options(const VolumeInfo& volume, const ConvertOptions& options) {
 StoreLayout plan_layout(const VolumeInfo& volume, const ConvertOptions& options, bool sparse) {
   check_options(volume, options);
   StoreLayout layout;
-  layout.codec = options.codec;
+  // A choice is made once bricks are known; one of these two it is.
+  layout.codec = options.codec == BrickCodec::automatic ? BrickCodec::zstd : options.codec;
   layout.zstd_level = options.zstd_level;
   layout.fill_value = volume.fill_value;
   layout.grid_class = volume.grid_class;

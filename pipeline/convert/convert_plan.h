@@ -9,7 +9,8 @@
 
 namespace isobrick::inline v0 {
 
-/// What the store of `volume` will look like; `sparse`: its bricks must suit SparsePyramid. Throws
+/// What the store of `volume` will look like, with zstd where the codec is still to be chosen;
+/// `sparse`: its bricks must suit SparsePyramid. Throws
 /// UsageError for options that make no sense.
 StoreLayout plan_layout(const VolumeInfo& volume, const ConvertOptions& options,
                         bool sparse = false);

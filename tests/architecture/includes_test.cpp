@@ -63,6 +63,7 @@ const std::map<std::string, Names> kPublicHeaders = {
     {"pipeline/histogram", {"histogram", "isovalue"}},
     {"pipeline/convert", {"convert"}},
     {"pipeline/export", {"export"}},
+    {"pipeline/recode", {"recode"}},
     {"pipeline/extract", {"estimate", "extract", "index_choice"}},
     {"pipeline/index", {"index_build"}},
     {"pipeline/labels", {"labels"}},

@@ -84,6 +84,9 @@ def run_commands(check):
     check.run("convert", "convert", "a.nrrd", "c.zarr")
     check.run("convert", "convert", "a.nrrd", "p.zarr", "--part", "1/1")
     check.run("convert", "convert", "a.nrrd", "p.zarr", "--join", "1")
+    check.run("recode", "recode", "a.zarr", "r.zarr")
+    check.run("recode", "recode", "a.zarr", "z.zarr", "--codec", "zstd:5")
+    check.run("convert", "convert", "a.nrrd", "auto.zarr", "--codec", "auto")
     check.run("index", "index", "c.zarr", "--kind", "kdtree", "--leaf", "4")
     for options in ([], ["--stats"]):
         check.run("info", "info", "a.zarr", *options)

@@ -41,7 +41,7 @@ TEST_F(Completion, OfBash) {
   };
   EXPECT_EQ(completed("isobrick ex", 1), "extract export\n");
   EXPECT_EQ(completed("isobrick convert --type f", 3), "f32 f64\n");
-  EXPECT_EQ(completed("isobrick convert --codec ''", 3), "zstd packed none\n");
+  EXPECT_EQ(completed("isobrick convert --codec ''", 3), "zstd packed none auto\n");
   EXPECT_EQ(completed("isobrick extract --iso", 2), "--isovalue\n");
   EXPECT_EQ(completed("isobrick extract --isovalue 5 --iso", 4), "--isovalue\n");
   EXPECT_EQ(completed("isobrick extract --level 0 --lev", 4), "--levels\n");

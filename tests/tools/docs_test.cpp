@@ -130,7 +130,7 @@ TEST_F(Docs, LinesOfTheReadmeRun) {
     subcommands.insert(rest.substr(0, rest.find(' ')));
   }
   for (const char* name : {"convert", "info", "extract", "render", "view", "index", "export",
-                           "verify", "synth", "man", "completion"})
+                           "recode", "verify", "synth", "man", "completion"})
     EXPECT_TRUE(subcommands.contains(name)) << name;
   EXPECT_TRUE(fs::exists(path("skull.pvtp")));
 }
@@ -139,7 +139,7 @@ TEST_F(Docs, ExamplesOfHelpRun) {
   unpack("head.raw");
   unpack("head_64x64x93_int16.raw");
   for (const char* command : {"convert", "info", "index", "verify", "extract", "merge", "export",
-                              "render", "view", "synth", "completion", "man", "help"}) {
+                              "recode", "render", "view", "synth", "completion", "man", "help"}) {
     const std::string help = run({"help", command}).out;
     int examples = 0;
     const auto begin = help.find("Example:\n");

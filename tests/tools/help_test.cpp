@@ -5,7 +5,7 @@ namespace {
 
 using Help = ProgramTest;
 
-const Arguments kCommands{"convert", "info", "index", "verify",     "extract", "export",
+const Arguments kCommands{"convert", "info", "index", "verify",     "extract", "export", "recode",
                           "render",  "view", "synth", "completion", "man",     "help"};
 
 /// A word of the first line that begins with "Usage".

@@ -41,8 +41,8 @@ class Options : public ProgramTest {
  protected:
   std::map<std::string, std::map<std::string, Option>> all() {
     std::map<std::string, std::map<std::string, Option>> commands;
-    for (const char* name : {"convert", "info", "index", "verify", "extract", "export", "render",
-                             "view", "synth", "completion", "man", "help"}) {
+    for (const char* name : {"convert", "info", "index", "verify", "extract", "export", "recode",
+                             "render", "view", "synth", "completion", "man", "help"}) {
       const std::string help = run({"help", name}).out;
       if (help.find("not in this program") == std::string::npos) commands[name] = options_of(help);
     }
@@ -54,7 +54,7 @@ TEST_F(Options, OneNameHasOneGrammarAndOneDefault) {
   // What differs, because it is about another kind of output or another kind of choice.
   const std::set<std::string> other_values{"--format", "--output", "--level"};
   const std::set<std::string> other_defaults{"--format", "--output",     "--isovalue", "--level",
-                                             "--size",   "--gpu-memory", "--kind"};
+                                             "--size",   "--gpu-memory", "--kind",     "--codec"};
   std::map<std::string, std::pair<std::string, Option>> first;
   int compared = 0;
   for (const auto& [command, options] : all())
@@ -93,7 +93,8 @@ TEST_F(Options, WhatEveryCommandOfAKindHas) {
   expect({"extract", "render", "view"}, {"--camera", "--size"});
   expect({"extract", "view"}, {"--search", "--backend", "--gpu-memory", "--inside", "--isovalue"});
   expect({"convert", "synth"}, {"--build-index", "--brick", "--codec"});
-  expect({"convert", "synth", "extract", "export", "render"}, {"--output", "--force"});
+  expect({"recode"}, {"--codec", "--resume", "--memory", "--threads"});
+  expect({"convert", "synth", "extract", "export", "recode", "render"}, {"--output", "--force"});
   expect({"convert", "synth", "index", "verify", "extract", "export", "view", "info"},
          {"--memory", "--threads"});
   for (const auto& [name, options] : commands)

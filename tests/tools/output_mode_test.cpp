@@ -8,8 +8,8 @@ namespace {
 
 using OutputMode = ProgramTest;
 
-constexpr std::array kCommands{"convert", "info",  "index",      "verify", "extract",
-                               "export",  "synth", "completion", "man",    "help"};
+constexpr std::array kCommands{"convert", "info",   "index",      "verify", "extract", "export",
+                               "synth",   "recode", "completion", "man",    "help"};
 
 TEST_F(OutputMode, Version) {
   const Outcome outcome = run({"--version"});

@@ -56,6 +56,11 @@ TEST(Parse, Types) {
 TEST(Parse, CodecAndLevels) {
   EXPECT_EQ(parse_codec("none").codec, BrickCodec::none);
   EXPECT_EQ(parse_codec("packed").codec, BrickCodec::packed);
+  EXPECT_EQ(parse_codec("auto").codec, BrickCodec::automatic);
+  EXPECT_EQ(parse_codec("auto").packed_factor, kMaxPackedFactor);
+  EXPECT_EQ(parse_codec("auto:1.5").packed_factor, 1.5);
+  for (const char* wrong : {"auto:", "auto:0", "auto:-2", "auto:nan", "auto:inf", "automatic"})
+    EXPECT_THROW(parse_codec(wrong), UsageError) << wrong;
   EXPECT_EQ(parse_codec("zstd").codec, BrickCodec::zstd);
   EXPECT_EQ(parse_codec("zstd").zstd_level, 3);
   EXPECT_EQ(parse_codec("zstd:19").zstd_level, 19);
