@@ -25,7 +25,7 @@ from ._labels import extract_labels
 from ._marching_cubes import marching_cubes
 from ._mesh import Measure, Mesh
 from ._open import open
-from ._operations import convert, export, index, info, synth, verify
+from ._operations import convert, export, index, info, recode, synth, verify
 from ._picture import Picture, render
 from ._volume import Histogram, Level, Volume
 
@@ -53,6 +53,7 @@ __all__ = [
     "info",
     "marching_cubes",
     "open",
+    "recode",
     "render",
     "synth",
     "verify",

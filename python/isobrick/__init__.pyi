@@ -587,6 +587,17 @@ def open(
 def convert(
     source: Any, path: _Path, *, progress: _Progress = None, **options: Any
 ) -> dict[str, Any]: ...
+def recode(
+    source: _Path,
+    path: _Path,
+    compression: Union[int, Literal["packed", "auto"], None] = "auto",
+    *,
+    resume: bool = False,
+    force: bool = False,
+    memory: _Bytes = ...,
+    threads: int = 0,
+    progress: _Progress = None,
+) -> dict[str, Any]: ...
 def index(
     path: _Path,
     kind: Literal["linear", "interval", "kdtree", "quadtree", "octree"] = "octree",

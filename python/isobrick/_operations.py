@@ -10,7 +10,7 @@ from ._progress import reporting
 from ._samples import ARRAY_NAMES, Samples
 from ._volume import Volume
 
-__all__ = ["convert", "export", "index", "info", "synth", "verify"]
+__all__ = ["convert", "export", "index", "info", "recode", "synth", "verify"]
 
 
 def _convert_options(
@@ -22,8 +22,10 @@ def _convert_options(
     options.shard = None if shard is None else integer(shard, "shard", -(2**31), 2**31 - 1)
     if compression is None:
         options.set_uncompressed()
-    elif compression == "packed":
+    elif isinstance(compression, str) and compression == "packed":
         options.set_packed()
+    elif isinstance(compression, str) and compression == "auto":
+        options.set_automatic()
     else:
         options.zstd_level = integer(compression, "compression", -(2**31), 2**31 - 1)
     options.levels = None if levels is None else integer(levels, "levels", -(2**31), 2**31 - 1)
@@ -70,9 +72,10 @@ def convert(source, path, *, progress=None, **options):
         The store, such as "ct.zarr". It has its name once it is whole.
     brick, shard : int
         Samples along each edge of a brick, and of a shard.
-    compression : int, "packed" or None
+    compression : int, "packed", "auto" or None
         Level of zstd; "packed": bits of differences, decoded many times faster, but only by
-        Isobrick; None: samples are stored as they are.
+        Isobrick; "auto": packed where it takes at most 1.1 times the bytes of zstd in some
+        bricks; None: samples are stored as they are.
     levels : int
         Resolutions; by default until one brick holds the coarsest.
     downsampling : "mean", "max", "min", "mode" or "stride"
@@ -90,7 +93,7 @@ def convert(source, path, *, progress=None, **options):
         and `nodata`, as of `Extractor`. Missing samples become NaN: the store of integers is then
         one of float32, or of float64 for 32 bits.
 
-    Returns a dictionary of what was done: bytes_in, bytes_out, levels, bricks, seconds, ….
+    Returns a dictionary of what was done: bytes_in, bytes_out, levels, bricks, seconds, codec, ….
     """
     store, others = _split(options)
     if hasattr(source, "dtype") and hasattr(source, "shape"):
@@ -101,6 +104,35 @@ def convert(source, path, *, progress=None, **options):
     request = volume_request(memory=store.memory, threads=store.threads, **others)
     with reporting(progress) as report:
         return _isobrick.convert_file(source_path(source), path_text(path), request, store, report)
+
+
+def recode(
+    source, path, compression="auto", *, resume=False, force=False, memory=2**30, threads=0,
+    progress=None,
+):
+    """Writes a store once more with another compression; all else stays as it is.
+
+    Parameters
+    ----------
+    source : str or path
+        The store: a folder, a zip of one, or the URL of either.
+    path : str or path
+        The new store, such as "fast.zarr" or "fast.zarr.zip". It has its name once it is whole.
+    compression : int, "packed", "auto" or None
+        As of `convert`.
+    resume, force : bool
+        Goes on with an interrupted run on the same store; replaces a store that exists.
+    memory, threads, progress
+        As of `isobrick.open`.
+
+    Levels, ranges, histogram, indices and metadata are copied, and no sample is computed anew.
+    Returns a dictionary as `convert` does.
+    """
+    options = _convert_options(
+        compression=compression, resume=resume, force=force, memory=memory, threads=threads
+    )
+    with reporting(progress) as report:
+        return _isobrick.recode(source_path(source), path_text(path), options, report)
 
 
 def index(

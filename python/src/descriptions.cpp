@@ -77,12 +77,22 @@ py::dict describe(const VolumeInfo& info) {
   return dict;
 }
 
+py::object describe(const std::optional<CodecSample>& sample) {
+  if (!sample) return py::none();
+  return py::dict(py::arg("bricks") = sample->bricks, py::arg("bytes") = sample->bytes,
+                  py::arg("zstd_bytes") = sample->zstd_bytes,
+                  py::arg("packed_bytes") = sample->packed_bytes,
+                  py::arg("zstd_decode_seconds") = sample->zstd_seconds,
+                  py::arg("packed_decode_seconds") = sample->packed_seconds);
+}
+
 py::dict describe(const ConvertReport& report) {
-  return py::dict(py::arg("bytes_in") = report.bytes_in, py::arg("bytes_out") = report.bytes_out,
-                  py::arg("levels") = report.levels, py::arg("bricks") = report.bricks,
-                  py::arg("bricks_absent") = report.bricks_absent,
-                  py::arg("bricks_kept") = report.bricks_kept,
-                  py::arg("index_bytes") = report.index_bytes, py::arg("seconds") = report.seconds);
+  return py::dict(
+      py::arg("bytes_in") = report.bytes_in, py::arg("bytes_out") = report.bytes_out,
+      py::arg("levels") = report.levels, py::arg("bricks") = report.bricks,
+      py::arg("bricks_absent") = report.bricks_absent, py::arg("bricks_kept") = report.bricks_kept,
+      py::arg("index_bytes") = report.index_bytes, py::arg("seconds") = report.seconds,
+      py::arg("codec") = report.codec, py::arg("codec_sample") = describe(report.codec_sample));
 }
 
 }  // namespace isobrick::python

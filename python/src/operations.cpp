@@ -10,6 +10,7 @@
 #include <isobrick/error.h>
 #include <isobrick/index_build.h>
 #include <isobrick/open_source.h>
+#include <isobrick/recode.h>
 #include <isobrick/synth_source.h>
 #include <isobrick/verify.h>
 #include "bricks/zarr/metadata_files.h"
@@ -31,6 +32,7 @@ void bind_convert_options(py::module_& module) {
       .def_readwrite("brick", &ConvertOptions::brick)
       .def_readwrite("shard", &ConvertOptions::shard)
       .def("set_packed", [](ConvertOptions& o) { o.codec = BrickCodec::packed; })
+      .def("set_automatic", [](ConvertOptions& o) { o.codec = BrickCodec::automatic; })
       .def("set_uncompressed", [](ConvertOptions& o) { o.codec = BrickCodec::none; })
       .def_readwrite("zstd_level", &ConvertOptions::zstd_level)
       .def_readwrite("levels", &ConvertOptions::levels)
@@ -88,6 +90,23 @@ py::dict convert_function(const py::object& read, Int3 extent, ScalarType type, 
   Volume volume = volume_of(read, extent, type);
   add_missing(volume, nodata, mask);
   return convert_volume(volume, memory, transform, out, options, callback);
+}
+
+/// Of the options those that concern a store which is there already.
+py::dict recode_store(const std::string& path, const std::string& out,
+                      const ConvertOptions& options, const py::object& callback) {
+  return describe(interruptible(callback, [&](Reporter reporter) {
+    return recode(StoreReader(path), out,
+                  {.codec = options.codec,
+                   .zstd_level = options.zstd_level,
+                   .packed_factor = options.packed_factor,
+                   .memory = options.memory,
+                   .threads = options.threads,
+                   .resume = options.resume,
+                   .force = options.force,
+                   .cancel = reporter.cancel},
+                  reporter.progress);
+  }));
 }
 
 py::dict index_store(const std::string& path, const std::string& kind, Index leaf,
@@ -182,6 +201,7 @@ void bind_operations(py::module_& module) {
   module.def("convert_file", &convert_file);
   module.def("convert_array", &convert_array);
   module.def("convert_function", &convert_function);
+  module.def("recode", &recode_store);
   module.def("index", &index_store);
   module.def("verify", &verify_store);
   module.def("describe", &describe_path);

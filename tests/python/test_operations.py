@@ -24,6 +24,34 @@ def test_arrays_become_stores(tmp_path):
     assert isobrick.open(tmp_path / "a.zarr").info["codec"] == "none"
     isobrick.convert(field, tmp_path / "a.zarr", force=True, compression="packed")
     assert isobrick.open(tmp_path / "a.zarr").info["codec"] == "packed"
+    done = isobrick.convert(field, tmp_path / "a.zarr", force=True, compression="auto")
+    assert isobrick.open(tmp_path / "a.zarr").info["codec"] == done["codec"]
+    assert done["codec_sample"]["bricks"] > 0
+
+
+def test_recode(field, tmp_path):
+    isobrick.convert(field, tmp_path / "a.zarr")
+    for compression, codec in (("packed", "packed"), (None, "none"), (5, "zstd:5")):
+        done = isobrick.recode(tmp_path / "a.zarr", tmp_path / "b.zarr", compression, force=True)
+        assert done["codec"] == codec and done["codec_sample"] is None
+        volume = isobrick.open(tmp_path / "b.zarr")
+        assert volume.info["codec"] == codec
+        assert np.array_equal(volume[:], field)
+    stages = []
+    done = isobrick.recode(
+        tmp_path / "a.zarr", tmp_path / "c.zarr.zip",
+        progress=lambda stage, done, total: stages.append(stage),
+    )
+    assert done["codec_sample"]["zstd_bytes"] > 0
+    assert isobrick.open(tmp_path / "c.zarr.zip").info["codec"] == done["codec"]
+    with pytest.raises(isobrick.UsageError, match="exists"):
+        isobrick.recode(tmp_path / "a.zarr", tmp_path / "b.zarr")
+    with pytest.raises(isobrick.UsageError, match="input"):
+        isobrick.recode(tmp_path / "a.zarr", tmp_path / "a.zarr", force=True)
+    with pytest.raises(isobrick.Error):
+        isobrick.recode(tmp_path / "none.zarr", tmp_path / "d.zarr")
+    with pytest.raises((isobrick.UsageError, TypeError)):
+        isobrick.recode(tmp_path / "a.zarr", tmp_path / "d.zarr", "lz4")
 
 
 class Lazy:
