@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <isobrick/storage.h>
+#include "bricks/zarr/metadata_files.h"
 #include "core/shell_word.h"
 
 namespace isobrick::tools {
@@ -22,12 +23,12 @@ std::string speed_text(const CodecSample& sample) {
 }
 
 /// The command that writes a store, or an image of another program, by another codec.
-std::string command(const StoreReader& store, const char* codec) {
-  const StoreInfo& info = store.info();
+std::string command(const StoreReader& store, const std::string& input, const char* codec) {
   // Zarr version 2 has no packed bricks; a conversion makes version 3 of it.
   const bool is_v3 = store.storage()->open("zarr.json") != nullptr;
-  return fmt::format("isobrick {} {} {}.zarr --codec {}", info.ours && is_v3 ? "recode" : "convert",
-                     shell_word(info.name), codec, codec);
+  const bool recode = store.info().ours && is_v3 && is_zarr(input);
+  return fmt::format("isobrick {} {} {}.zarr --codec {}", recode ? "recode" : "convert",
+                     shell_word(input), codec, codec);
 }
 
 }  // namespace
@@ -48,14 +49,15 @@ std::string codec_sample_text(const CodecSample& sample) {
                      sample.bricks == 1 ? "" : "s", ratio(sample), speed_text(sample));
 }
 
-std::string codec_advice(const StoreReader& store, const CodecSample& sample) {
+std::string codec_advice(const StoreReader& store, const std::string& input,
+                         const CodecSample& sample) {
   if (sample.bricks == 0) return codec_sample_text(sample);
   const bool is_packed = store.info().codec == "packed";
   // What takes more bytes must be faster.
   const bool packed_suits = ratio(sample) <= (speed(sample) >= 1 ? kMaxPackedFactor : 1);
   if (is_packed == packed_suits) return codec_sample_text(sample);
   return fmt::format("{}: {}", codec_sample_text(sample),
-                     command(store, packed_suits ? "packed" : "zstd"));
+                     command(store, input, packed_suits ? "packed" : "zstd"));
 }
 
 }  // namespace isobrick::tools

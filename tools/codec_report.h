@@ -18,6 +18,8 @@ nlohmann::ordered_json codec_sample_json(const std::optional<CodecSample>& sampl
 std::string codec_sample_text(const CodecSample& sample);
 
 /// Which codec would suit a store better, and what to type; or that it has the one that does.
-std::string codec_advice(const StoreReader& store, const CodecSample& sample);
+/// `input` is what was named: the store, or a file that it was made of.
+std::string codec_advice(const StoreReader& store, const std::string& input,
+                         const CodecSample& sample);
 
 }  // namespace isobrick::tools

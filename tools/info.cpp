@@ -144,7 +144,7 @@ void compare_codecs(const StoreReader& store, const InfoArguments& arguments, St
       sampling_threads(lattice, kLevel, arguments.memory, Workers(arguments.threads).threads());
   try {
     facts.codec_sample = sample_codecs(store, kLevel, threads);
-    facts.codec_advice = codec_advice(store, *facts.codec_sample);
+    facts.codec_advice = codec_advice(store, arguments.input.path, *facts.codec_sample);
   } catch (const DamageError&) {
   }
 }

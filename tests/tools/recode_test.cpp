@@ -260,6 +260,11 @@ TEST_F(Recode, InfoAdvises) {
             std::string::npos)
       << advice;
   EXPECT_GT(info["codec_sample"]["bricks"], 0);
+  succeed({"export", store, path("a.nrrd")});
+  const std::string of_file = run_json({"info", path("a.nrrd"), "--stats"})["codec_advice"];
+  EXPECT_NE(of_file.find("isobrick convert " + path("a.nrrd") + " packed.zarr --codec packed"),
+            std::string::npos)
+      << of_file;
   succeed({"recode", store, path("b.zarr")});
   const std::string none = run_json({"info", path("b.zarr"), "--stats"})["codec_advice"];
   EXPECT_EQ(none.find("isobrick"), std::string::npos) << none;
