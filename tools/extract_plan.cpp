@@ -44,21 +44,12 @@ fs::path default_output(const ExtractArguments& arguments, MeshFormat format, do
 
 /// How the mesh is written, or would be if it had a name.
 MeshForm form_of(const ExtractArguments& arguments) {
-  MeshForm form{.quantize = arguments.quantize,
-                .levels = arguments.levels,
-                .sharded = arguments.sharded,
-                .attributes = arguments.attributes.size()};
-  if (arguments.format)
-    form.format = *arguments.format;
-  else if (!arguments.output.empty())
-    form.format = mesh_format(arguments.output);
-  if (!arguments.output.empty()) check_mesh_name(arguments.output, form.format);
+  MeshForm form = with_format({.quantize = arguments.quantize,
+                               .levels = arguments.levels,
+                               .sharded = arguments.sharded,
+                               .attributes = arguments.attributes.size()},
+                              arguments.format, arguments.output);
   form.normals = arguments.normals.value_or(has_normals(form.format));
-  if (form.quantize && form.format != MeshFormat::glb)
-    throw UsageError(
-        fmt::format("--quantize is for GLB only, and this mesh becomes {}", name_of(form.format)));
-  check_levels(form);
-  check_attribute_format(form);
   return form;
 }
 

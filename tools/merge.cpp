@@ -45,21 +45,11 @@ fs::path default_output(const std::string& piece, MeshFormat format) {
 }
 
 MeshForm form_of(const MergeArguments& arguments) {
-  MeshForm form{.quantize = arguments.quantize,
-                .levels = arguments.levels,
-                .sharded = arguments.sharded,
-                .attributes = arguments.attributes.size()};
-  if (arguments.format)
-    form.format = *arguments.format;
-  else if (!arguments.output.empty())
-    form.format = mesh_format(arguments.output);
-  if (!arguments.output.empty()) check_mesh_name(arguments.output, form.format);
-  if (form.quantize && form.format != MeshFormat::glb)
-    throw UsageError(
-        fmt::format("--quantize is for GLB only, and this mesh becomes {}", name_of(form.format)));
-  check_levels(form);
-  check_attribute_format(form);
-  return form;
+  return with_format({.quantize = arguments.quantize,
+                      .levels = arguments.levels,
+                      .sharded = arguments.sharded,
+                      .attributes = arguments.attributes.size()},
+                     arguments.format, arguments.output);
 }
 
 /// Refuses a mesh that cannot fit its disk.

@@ -14,16 +14,10 @@ namespace isobrick::tools {
 
 namespace fs = std::filesystem;
 
-MeshFormat mesh_format(const fs::path& path) {
-  if (is_standard_output(path.native())) return MeshFormat::ply;
-  if (const auto format = find_mesh_format(without_slash(path).extension().string()))
-    return *format;
-  throw UsageError(
-      fmt::format("'{}' is no mesh that can be written; name it .ply, .stl, .obj, .glb, .vtp, "
-                  ".pvtp or .neuroglancer, or add --format",
-                  path.string()));
-}
+namespace {
 
+/// Throws UsageError where the name has the extension of another format, or is standard output and
+/// the format has several files.
 void check_mesh_name(const fs::path& path, MeshFormat format) {
   const std::string_view extension = isobrick::extension_of(format);
   if (is_standard_output(path.native())) {
@@ -40,6 +34,27 @@ void check_mesh_name(const fs::path& path, MeshFormat format) {
                          fmt::format("--format {} writes another format", extension.substr(1)));
 }
 
+/// Throws UsageError for attributes that the format cannot hold.
+void check_attribute_format(const MeshForm& form) {
+  if (form.attributes > 0 && !has_attributes(form.format))
+    throw UsageError(
+        fmt::format("--attribute: {} cannot hold attributes of vertices; choose PLY, VTP, PVTP or "
+                    "GLB",
+                    name_of(form.format)));
+}
+
+}  // namespace
+
+MeshFormat mesh_format(const fs::path& path) {
+  if (is_standard_output(path.native())) return MeshFormat::ply;
+  if (const auto format = find_mesh_format(without_slash(path).extension().string()))
+    return *format;
+  throw UsageError(
+      fmt::format("'{}' is no mesh that can be written; name it .ply, .stl, .obj, .glb, .vtp, "
+                  ".pvtp or .neuroglancer, or add --format",
+                  path.string()));
+}
+
 MeshFormat parse_mesh_format(const std::string& text) {
   if (const auto format = find_mesh_format("." + text)) return *format;
   throw UsageError(fmt::format(
@@ -54,12 +69,19 @@ void check_levels(const MeshForm& form) {
         name_of(form.format)));
 }
 
-void check_attribute_format(const MeshForm& form) {
-  if (form.attributes > 0 && !has_attributes(form.format))
+MeshForm with_format(MeshForm form, const std::optional<MeshFormat>& named,
+                     const fs::path& output) {
+  if (named)
+    form.format = *named;
+  else if (!output.empty())
+    form.format = mesh_format(output);
+  if (!output.empty()) check_mesh_name(output, form.format);
+  if (form.quantize && form.format != MeshFormat::glb)
     throw UsageError(
-        fmt::format("--attribute: {} cannot hold attributes of vertices; choose PLY, VTP, PVTP or "
-                    "GLB",
-                    name_of(form.format)));
+        fmt::format("--quantize is for GLB only, and this mesh becomes {}", name_of(form.format)));
+  check_levels(form);
+  check_attribute_format(form);
+  return form;
 }
 
 void check_can_write_mesh(const fs::path& path, MeshFormat format, bool force) {

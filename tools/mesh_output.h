@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 
 #include <isobrick/mesh_file_sink.h>
@@ -20,17 +21,16 @@ struct MeshForm {
 
 /// By the name's extension; PLY on standard output. Throws UsageError for any other.
 MeshFormat mesh_format(const std::filesystem::path& path);
-/// Throws UsageError where the name has the extension of another format, or is standard output and
-/// the format has several files.
-void check_mesh_name(const std::filesystem::path& path, MeshFormat format);
 /// By a word such as "ply". Throws UsageError for any other.
 MeshFormat parse_mesh_format(const std::string& text);
 
 /// Throws UsageError for levels of detail and shards that the format has not.
 void check_levels(const MeshForm& form);
 
-/// Throws UsageError for attributes that the format cannot hold.
-void check_attribute_format(const MeshForm& form);
+/// `form` with the format that is named, or that of the output's name; neither of them may be
+/// there. Throws UsageError for a name or a part of the form that does not fit the format.
+MeshForm with_format(MeshForm form, const std::optional<MeshFormat>& named,
+                     const std::filesystem::path& output);
 
 /// Throws as check_can_write(), and for a folder where it exists and `force` is not set.
 void check_can_write_mesh(const std::filesystem::path& path, MeshFormat format, bool force);
