@@ -35,7 +35,7 @@ std::vector<Bytes> cut(const Volume& v) {
   std::vector<Bytes> bricks;
   const Int3 grid = ceil_div(v.extent, kBrick);
   for (Index i = 0; i < volume(grid); ++i) {
-    const Int3 b{i % grid.x, i / grid.x % grid.y, i / grid.x / grid.y};
+    const Int3 b = point_at(i, grid);
     const Box3 box = intersect({b * kBrick, (b + Int3{1, 1, 1}) * kBrick}, {{}, v.extent});
     Bytes brick(static_cast<std::size_t>(volume(kBrick)) * size);
     for (Index z = box.lo.z; z < box.hi.z; ++z)

@@ -48,8 +48,7 @@ void BlockIndex::append_active_tiles(double isovalue, std::vector<TileWork>& til
     query(view, isovalue, ids);
     const Int3 blocks = view.grid();
     for (const std::uint32_t id : ids) {
-      const Index i = id;
-      const Int3 b{i % blocks.x, i / blocks.x % blocks.y, i / (blocks.x * blocks.y)};
+      const Int3 b = point_at(id, blocks);
       const Int3 t{b.x / kEdge, b.y / kEdge, b.z / kEdge};
       if (tiles.empty() || tiles.back().tile != t) tiles.push_back({.tile = t});
       const auto bit = 1u << ((b.x & 1) | (b.y & 1) << 1 | (b.z & 1) << 2);

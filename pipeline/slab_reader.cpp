@@ -52,8 +52,7 @@ void read_slab(const StoreReader& store, int level, Box3 box, std::byte* out,
   const Box3 bricks = lattice.bricks_of(box);
   const Int3 count = bricks.extent();
   tbb::parallel_for(Index{0}, volume(count), [&](Index i) {
-    const Int3 brick =
-        bricks.lo + Int3{i % count.x, i / count.x % count.y, i / (count.x * count.y)};
+    const Int3 brick = bricks.lo + point_at(i, count);
     if (!failure) return copy_brick(store, level, brick, box, out, checksum);
     try {
       copy_brick(store, level, brick, box, out, checksum);

@@ -9,10 +9,7 @@
 namespace isobrick::inline v0 {
 namespace {
 
-Int3 point_of(std::uint64_t key, Int3 grid) {
-  const auto k = static_cast<Index>(key);
-  return {k % grid.x, k / grid.x % grid.y, k / (grid.x * grid.y)};
-}
+Int3 point_of(std::uint64_t key, Int3 grid) { return point_at(static_cast<Index>(key), grid); }
 
 /// The tiles that look at samples of a brick: tile t does at 32·t − reach … 32·t + 32 + reach.
 Box3 tiles_using(const Lattice& lattice, Index reach, Int3 brick) {

@@ -218,9 +218,7 @@ std::optional<Int3> BrickPool::find_damaged(bool all) {
   }
   const auto number = std::atomic_ref(impl_->report[0].failed).load(std::memory_order_relaxed);
   if (number == PackedUploads::kNoBrick) return std::nullopt;
-  const auto i = static_cast<Index>(number);
-  const Int3 grid = impl_->grid;
-  return Int3{i % grid.x, i / grid.x % grid.y, i / grid.x / grid.y};
+  return point_at(static_cast<Index>(number), impl_->grid);
 }
 
 void BrickPool::wait_on(const Stream& stream) {

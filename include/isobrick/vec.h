@@ -75,6 +75,11 @@ constexpr Index linear_index(Int3 p, Int3 extent) {
   return (p.z * extent.y + p.y) * extent.x + p.x;
 }
 
+/// The point at an offset in such an array: the inverse of linear_index().
+constexpr Int3 point_at(Index offset, Int3 extent) {
+  return {offset % extent.x, offset / extent.x % extent.y, offset / extent.x / extent.y};
+}
+
 /// Half-open box of lattice points [lo, hi).
 struct Box3 {
   Int3 lo;  ///< the first point along each axis

@@ -33,8 +33,7 @@ void LevelWriter::write_bricks(Box3 box, const std::byte* samples) {
   Index next = 0;
   const auto take = [&](PackedBrick& packed) {
     if (next == volume(count)) return false;
-    const Index i = next++;
-    packed.brick = bricks.lo + Int3{i % count.x, i / count.x % count.y, i / (count.x * count.y)};
+    packed.brick = bricks.lo + point_at(next++, count);
     return true;
   };
   const auto pack = [&](PackedBrick& packed) {

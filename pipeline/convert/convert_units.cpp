@@ -31,8 +31,7 @@ ConvertUnits::ConvertUnits(const StoreLayout& layout, const std::filesystem::pat
 }
 
 Box3 ConvertUnits::box(std::uint64_t unit) const {
-  const auto i = static_cast<Index>(unit);
-  const Int3 at{i % grid_.x, i / grid_.x % grid_.y, i / (grid_.x * grid_.y)};
+  const Int3 at = point_at(static_cast<Index>(unit), grid_);
   return intersect({at * edge_, (at + Int3{1, 1, 1}) * edge_}, lattice_.box());
 }
 

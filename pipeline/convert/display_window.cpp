@@ -50,7 +50,7 @@ std::vector<double> some_samples(const StoreReader& store) {
   std::vector<double> values;
   Index count = 0;
   for (Index i = nth_brick / 2; i < volume(bricks); i += nth_brick) {
-    const Int3 b{i % bricks.x, i / bricks.x % bricks.y, i / (bricks.x * bricks.y)};
+    const Int3 b = point_at(i, bricks);
     if (!store.read_brick(level, b, brick.data()))
       fill_box(lattice.type, store.info().fill_value, {brick.data(), lattice.full_brick_box(b)},
                lattice.full_brick_box(b));

@@ -10,10 +10,7 @@ constexpr Index kHinted = 32;
 
 }  // namespace
 
-Int3 BrickWalk::brick_at(Index i) const {
-  const Int3 n = bricks_.extent();
-  return bricks_.lo + Int3{i % n.x, i / n.x % n.y, i / (n.x * n.y)};
-}
+Int3 BrickWalk::brick_at(Index i) const { return bricks_.lo + point_at(i, bricks_.extent()); }
 
 void BrickWalk::hint(Index begin, Index end) {
   std::vector<Int3> soon;
@@ -44,8 +41,7 @@ bool BrickWalk::next_shard(MovedBrick& brick) {
     shards = ceil_div(info->lattice.extent, info->shard);
     if (shard_ < volume(shards)) break;
   }
-  at_shard_ = {shard_ % shards.x, shard_ / shards.x % shards.y, shard_ / (shards.x * shards.y)};
-  ++shard_;
+  at_shard_ = point_at(shard_++, shards);
   const Int3 n = ceil_div(info->shard, info->lattice.brick);
   bricks_ = intersect({at_shard_ * n, (at_shard_ + Int3{1, 1, 1}) * n},
                       {{0, 0, 0}, info->lattice.bricks()});

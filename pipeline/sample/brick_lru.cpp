@@ -34,10 +34,8 @@ void BrickLru::hold(std::span<const std::uint64_t> bricks, std::vector<const std
   const Int3 grid = lattice.bricks();
   tbb::parallel_for(std::size_t{0}, missing.size(), [&](std::size_t i) {
     auto& [number, samples] = missing[i];
-    const auto b = static_cast<Index>(number);
     samples.resize(lattice.brick_bytes());
-    if (!store_.read_brick(0, {b % grid.x, b / grid.x % grid.y, b / (grid.x * grid.y)},
-                           samples.data()))
+    if (!store_.read_brick(0, point_at(static_cast<Index>(number), grid), samples.data()))
       samples = {};
   });
   for (auto& [brick, samples] : missing) {

@@ -54,9 +54,7 @@ class IndexCheck {
 };
 
 Int3 brick_of(Box3 bricks, std::size_t part) {
-  const Int3 e = bricks.extent();
-  const auto i = static_cast<Index>(part) - 1;
-  return bricks.lo + Int3{i % e.x, i / e.x % e.y, i / (e.x * e.y)};
+  return bricks.lo + point_at(static_cast<Index>(part) - 1, bricks.extent());
 }
 
 std::string IndexCheck::name_of_part(Box3 bricks, std::size_t part) const {
