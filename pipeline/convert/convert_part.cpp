@@ -11,6 +11,7 @@
 #include <isobrick/error.h>
 #include <isobrick/pod_buffer.h>
 #include "bricks/store_writer.h"
+#include "bricks/zarr/codec.h"
 #include "bricks/zarr/store_names.h"
 #include "core/copy_box.h"
 #include "pipeline/convert/brick_output.h"
@@ -106,8 +107,28 @@ class PartConversion {
     return {floor_div(box.lo, shard), ceil_div(box.hi, shard)};
   }
 
-  /// The end of a unit's file, where that and all of its shards are whole.
-  std::optional<UnitEnd> find_whole(std::uint64_t unit) const {
+  /// Reads a unit slab by slab, each with the layer beyond the unit's upper borders, for the
+  /// ranges. Calls f(slab, what was read), whose samples lie in `samples_` then. The checksum of
+  /// them all.
+  template <class F>
+  std::uint32_t read_unit(Box3 box, const F& f) {
+    const Box3 all = intersect({box.lo, box.hi + Int3{1, 1, 1}}, lattice_.box());
+    std::uint32_t crc = 0;
+    for (Index z = box.lo.z; z < box.hi.z; z += planes_) {
+      Box3 slab = box, read = all;
+      slab.lo.z = read.lo.z = z;
+      slab.hi.z = std::min(z + planes_, box.hi.z);
+      if (slab.hi.z < box.hi.z) read.hi.z = slab.hi.z;
+      samples_.resize(bytes_of(read));
+      read_box(source_, read, samples_.data());
+      crc = crc32c({samples_.data(), samples_.size()}, crc);
+      f(slab, read);
+    }
+    return crc;
+  }
+
+  /// The end of a unit's file, where that and all of its shards are whole, and made of this input.
+  std::optional<UnitEnd> find_whole(std::uint64_t unit) {
     const Box3 box = units_.box(unit);
     const auto file =
         UnitReader::open(units_.file_of(part_, unit), units_.layout_crc32c(), box, true);
@@ -118,15 +139,16 @@ class PartConversion {
     for_each_point(shards_of(box), [&](Int3 s) {
       is_whole = is_whole && (has_bricks[shard++] == 0 || store_.shard_is_whole(0, s));
     });
-    return is_whole ? std::optional(file->end()) : std::nullopt;
+    if (!is_whole) return std::nullopt;
+    const std::uint32_t now = read_unit(box, [](Box3, Box3) {});
+    return now == file->end().samples_crc32c ? std::optional(file->end()) : std::nullopt;
   }
 
   void make(std::uint64_t unit, ConvertReport& report) {
     const Box3 box = units_.box(unit);
-    // One layer more, where there is one, for the ranges at the upper borders.
-    const Box3 read = intersect({box.lo, box.hi + Int3{1, 1, 1}}, lattice_.box());
-    const Lattice around{read.extent(), lattice_.brick, lattice_.type};
-    const std::unique_ptr<LevelRanges> ranges = make_level_ranges(around);
+    const Int3 with_border = min(box.hi + Int3{1, 1, 1}, lattice_.extent) - box.lo;
+    const std::unique_ptr<LevelRanges> ranges =
+        make_level_ranges({with_border, lattice_.brick, lattice_.type});
     const Lattice own{box.extent(), lattice_.brick, lattice_.type};
     UnitRanges blocks(own.blocks(), 2 * lattice_.sample_bytes());
     UnitRanges bricks(own.bricks(), 2 * lattice_.sample_bytes());
@@ -135,28 +157,20 @@ class PartConversion {
     const Box3 shards = shards_of(box);
     std::vector<std::uint8_t> has_bricks(static_cast<std::size_t>(volume(shards.extent())));
     UnitWriter file(units_.file_of(part_, unit), units_.layout_crc32c(), box);
-    for (Index z = box.lo.z; z < box.hi.z; z += planes_) {
-      Box3 slab = box;
-      slab.lo.z = z;
-      slab.hi.z = std::min(z + planes_, box.hi.z);
-      Box3 with_border = read;
-      with_border.lo.z = z;
-      if (slab.hi.z < box.hi.z) with_border.hi.z = slab.hi.z;
-      samples_.resize(bytes_of(with_border));
-      read_box(source_, with_border, samples_.data());
-      ranges->add({with_border.lo - box.lo, with_border.hi - box.lo}, samples_.data());
+    const std::uint32_t crc = read_unit(box, [&](Box3 slab, Box3 read) {
+      ranges->add({read.lo - box.lo, read.hi - box.lo}, samples_.data());
       ranges->close(
-          with_border.hi.z - box.lo.z,
+          read.hi.z - box.lo.z,
           [&](Box3 items, std::span<const std::byte> pairs) { blocks.add(items, pairs); },
           [&](Box3 items, std::span<const std::byte> pairs) { bricks.add(items, pairs); });
       own_.resize(bytes_of(slab));
-      copy_box({samples_.data(), with_border}, {own_.data(), slab}, slab, lattice_.sample_bytes());
+      copy_box({samples_.data(), read}, {own_.data(), slab}, slab, lattice_.sample_bytes());
       write_bricks(slab, output, has_bricks, shards);
       append_coarse(slab, file);
-    }
-    for_each_point(shards_of(box), [&](Int3 s) { store_.finish_shard(0, s); });
+    });
+    for_each_point(shards, [&](Int3 s) { store_.finish_shard(0, s); });
     file.finish({blocks.pairs(), bricks.pairs(), counts->counts(), has_bricks, ranges->has_nan(),
-                 output.counts().bricks, output.counts().absent});
+                 crc, output.counts().bricks, output.counts().absent});
     report.bricks += output.counts().bricks;
     report.bricks_absent += output.counts().absent;
   }
@@ -170,8 +184,7 @@ class PartConversion {
     Index next = 0;
     const auto take = [&](PackedBrick& packed) {
       if (next == volume(count)) return false;
-      const Index i = next++;
-      packed.brick = bricks.lo + Int3{i % count.x, i / count.x % count.y, i / (count.x * count.y)};
+      packed.brick = bricks.lo + point_at(next++, count);
       return true;
     };
     run_in_order<PackedBrick>(

@@ -43,6 +43,7 @@ void UnitWriter::finish(const UnitContent& content) {
   end_.shards = content.has_bricks.size();
   end_.bins = content.counts.bins;
   end_.has_nan = content.has_nan ? 1 : 0;
+  end_.samples_crc32c = content.samples_crc32c;
   end_.bricks = content.bricks;
   end_.absent = content.absent;
   end_.bytes = out_.writer().size() + sizeof end_;

@@ -29,6 +29,8 @@ struct UnitEnd {
   HistogramBins bins;
   std::uint64_t bytes = 0;  ///< of the file
   std::uint32_t has_nan = 0;
+  std::uint32_t samples_crc32c = 0;  ///< of what was read of the input, slab by slab
+  std::uint32_t unused = 0;
   std::uint32_t layout_crc32c = 0;   ///< of the layout's marker
   std::uint32_t content_crc32c = 0;  ///< of all bytes before the end
   std::uint32_t own_crc32c = 0;      ///< of the end, but for itself
@@ -40,6 +42,7 @@ struct UnitContent {
   SampleCounts counts;
   std::vector<std::uint8_t> has_bricks;  ///< of each shard: whether it has a file
   bool has_nan = false;
+  std::uint32_t samples_crc32c = 0;
   std::uint64_t bricks = 0, absent = 0;
 };
 
