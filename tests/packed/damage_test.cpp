@@ -96,7 +96,7 @@ TEST(Packed, ABlockWithBytesTooManyIsRefused) {
   }
 }
 
-// Whoever reads packed bricks has room for plain samples, not for more.
+// Readers of packed bricks have room for plain samples, not for more.
 TEST(Packed, ABrickLongerThanPlainSamplesIsRefused) {
   const Int3 extent{16, 16, 16};
   // All groups with eight dense planes: a block as it should be, but for its length.

@@ -1,5 +1,6 @@
 #include <csignal>
 #include <cstdlib>
+#include <filesystem>
 #include <memory>
 
 #include <sys/wait.h>
@@ -103,6 +104,22 @@ TEST_F(Url, FailuresThatStayEndWithALine) {
   expect_refused(extract("http://127.0.0.1:1/a.zarr"), 1, {"127.0.0.1:1/a.zarr", "3 tries"});
   expect_refused(extract("https://"), 2, {"names no host"});
   EXPECT_EQ(files(), (std::vector<std::string>{"m.ply", "smooth.zarr"}));
+}
+
+TEST_F(Url, StoresAreRecodedAsFromTheFolder) {
+  namespace fs = std::filesystem;
+  const fs::path here = path("here.zarr"), fetched = path("fetched.zarr");
+  ASSERT_EQ(run({"recode", store_, here, "--codec", "packed"}).exit_code, 0);
+  const Outcome outcome = run({"recode", url("slow:20"), fetched, "--codec", "packed"});
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  std::size_t files = 0;
+  for (const auto& entry : fs::recursive_directory_iterator(here)) {
+    if (!entry.is_regular_file()) continue;
+    const fs::path name = fs::relative(entry.path(), here);
+    EXPECT_TRUE(read_file(here / name) == read_file(fetched / name)) << name;
+    ++files;
+  }
+  EXPECT_GT(files, 10u);
 }
 
 TEST_F(Url, ZipsAreReadToo) {
