@@ -173,19 +173,13 @@ DeviceVolume::DeviceVolume(const Lattice& lattice, const BrickLookup& bricks, do
 }
 
 DeviceVolume::DeviceVolume(const Lattice& lattice, double fill_value, const DeviceTiles& tiles,
-                           std::size_t staging_bytes)
-    : impl_(std::make_unique<Impl>(lattice, fill_value, tiles, staging_bytes, Stream())) {}
-DeviceVolume::DeviceVolume(const Lattice& lattice, double fill_value, const DeviceTiles& tiles,
-                           const DeviceTarget& target)
+                           const DeviceTarget* target)
     : impl_(std::make_unique<Impl>(
           lattice, fill_value, tiles, 0,
-          Stream(target.stream, target.memory ? target.memory : pool_memory()))) {}
+          target ? Stream(target->stream, target->memory ? target->memory : pool_memory())
+                 : Stream())) {}
 DeviceVolume::DeviceVolume(const DeviceArray& array) : impl_(std::make_unique<Impl>(array)) {}
 DeviceVolume::~DeviceVolume() = default;
-
-void DeviceVolume::load(std::span<const Int3> tiles, const BrickLookup& bricks) {
-  impl_->load(tiles, bricks);
-}
 
 const Lattice& DeviceVolume::lattice() const { return impl_->lattice; }
 

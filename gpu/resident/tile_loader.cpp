@@ -120,7 +120,7 @@ struct TileLoader::Impl {
       : volume(v),
         pool(p),
         max_tiles(most),
-        here(kInFlight * TablesWriter::bytes(v.lattice, most)),
+        here(table_bytes(v.lattice, most)),
         there(here.size(), v.stream) {
     for (std::size_t i = 0; i < kInFlight; ++i) {
       tables[i].here = here.data() + i * (here.size() / kInFlight);
@@ -150,6 +150,10 @@ struct TileLoader::Impl {
     volume.complete_if_loaded();
   }
 };
+
+std::uint64_t TileLoader::table_bytes(const Lattice& lattice, std::size_t max_tiles) {
+  return kInFlight * TablesWriter::bytes(lattice, max_tiles);
+}
 
 TileLoader::TileLoader(DeviceVolume& volume, BrickPool& pool, std::size_t max_tiles)
     : impl_(std::make_unique<Impl>(volume.impl(), pool, max_tiles)) {}

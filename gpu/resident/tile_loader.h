@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <span>
 
@@ -14,6 +16,9 @@ class TileLoader {
  public:
   /// Calls whose bricks are held at a time.
   static constexpr std::size_t kInFlight = 4;
+
+  /// Page-locked host memory, and as much device memory, that one takes.
+  static std::uint64_t table_bytes(const Lattice& lattice, std::size_t max_tiles);
 
   /// Both must outlive it. The device is the current one. A call takes at most `max_tiles`.
   TileLoader(DeviceVolume& volume, BrickPool& pool, std::size_t max_tiles);

@@ -18,6 +18,7 @@ PackedUploads::PackedUploads(const Lattice& lattice, std::size_t buffers)
 }
 
 PackedUploads::~PackedUploads() { (void)cudaStreamSynchronize(order_.get()); }
+
 void PackedUploads::set(std::size_t buffer, std::span<const std::byte> packed, Int3 brick,
                         ValueRange<double> range) {
   const packed::BrickLayout layout(lattice_.type, lattice_.brick, packed);

@@ -31,21 +31,16 @@ class ISOBRICK_API DeviceVolume {
   /// is not absent. Throws UsageError for a type that has no kernels, OutOfDeviceMemory when
   /// the device has too little.
   DeviceVolume(const Lattice& lattice, const BrickLookup& bricks, double fill_value);
-  /// Room for the loaded tiles, each of which load() takes once before the first extraction. They
-  /// pass through twice `staging_bytes` of pinned memory, at least a block's. Throws as above.
+  /// Room for the loaded tiles, which a loader within the library fills before the first
+  /// extraction (gpu/resident/tile_loader.h). Without a target the volume has a stream of its own.
+  /// Throws as above.
   DeviceVolume(const Lattice& lattice, double fill_value, const DeviceTiles& tiles,
-               std::size_t staging_bytes);
-  /// The same, for a loader within the library that has the samples on the device already.
-  DeviceVolume(const Lattice& lattice, double fill_value, const DeviceTiles& tiles,
-               const DeviceTarget& target);
+               const DeviceTarget* target = nullptr);
   /// Of an array of the current device, which must stay as it is: extractors copy the tiles that
   /// surfaces look at. Finds the ranges of all tiles and waits for them. Strides are given,
   /// multiples of a sample.
   explicit DeviceVolume(const DeviceArray& array);
   ~DeviceVolume();
-
-  /// Copies the samples of tiles, in the caller's TBB arena; `bricks` has those that they lie in.
-  void load(std::span<const Int3> tiles, const BrickLookup& bricks);
 
   /// The samples and how they lie.
   const Lattice& lattice() const;

@@ -45,11 +45,15 @@ bool use_cuda(const ExtractRequest& request, const ExtractOptions& options,
   const int devices = cuda_device_count();
   if (must && devices == 0)
     throw Error("--backend cuda: there is no CUDA device here; use --backend cpu");
-  if (devices > 0 && options.device >= devices)
-    throw UsageError(fmt::format("--device {} does not exist: there {} {} CUDA device{}, from 0",
-                                 options.device, devices == 1 ? "is" : "are", devices,
-                                 devices == 1 ? "" : "s"));
+  if (devices > 0) check_cuda_device(options.device, devices);
   return wanted && devices > 0;
+}
+
+void check_cuda_device(int device, int devices) {
+  if (device < 0 || device >= devices)
+    throw UsageError(fmt::format("--device {} does not exist: there {} {} CUDA device{}, from 0",
+                                 device, devices == 1 ? "is" : "are", devices,
+                                 devices == 1 ? "" : "s"));
 }
 
 bool can_be_resident(PassRequests requests) {

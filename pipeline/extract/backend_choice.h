@@ -20,6 +20,9 @@ namespace isobrick::inline v0 {
 bool use_cuda(const ExtractRequest& request, const ExtractOptions& options,
               std::uint64_t active_blocks);
 
+/// Throws UsageError for a number of a device that is none of so many.
+void check_cuda_device(int device, int devices);
+
 /// Whether surfaces that a GPU makes may share samples kept on it (resident_pass.h): there are
 /// several isovalues, all meshes are welded and no triangles are left out.
 bool can_be_resident(PassRequests requests);

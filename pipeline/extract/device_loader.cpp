@@ -52,8 +52,13 @@ DeviceLoader::DeviceLoader(const StoreReader& store, int level, const ExtractReq
       device_(device),
       pool_(pool_sizes(lattice_, request)) {}
 
-std::uint64_t DeviceLoader::pinned_bytes() const { return pool_pinned_bytes(lattice_, pool_); }
-std::uint64_t DeviceLoader::device_bytes() const { return pool_device_bytes(lattice_, pool_); }
+std::uint64_t DeviceLoader::pinned_bytes() const {
+  return pool_pinned_bytes(lattice_, pool_) + gpu::TileLoader::table_bytes(lattice_, kTilesOfBatch);
+}
+
+std::uint64_t DeviceLoader::device_bytes() const {
+  return pool_device_bytes(lattice_, pool_) + gpu::TileLoader::table_bytes(lattice_, kTilesOfBatch);
+}
 
 void DeviceLoader::load(gpu::DeviceVolume& volume, std::span<const Int3> tiles,
                         std::size_t tiles_at_once, const std::function<void(std::size_t)>& done) {

@@ -21,15 +21,14 @@ constexpr std::uint64_t kPieceOfDriver = std::uint64_t{32} << 20;
 
 class ResidentPass {
  public:
-  ResidentPass(const StoreReader& store, const ExtractOptions& options,
-               const PassSurfaces& surfaces, const ExtractPlan& plan, const gpu::DeviceInfo& device,
-               Progress& progress)
+  ResidentPass(DeviceLoader& loader, const ExtractOptions& options, const PassSurfaces& surfaces,
+               const ExtractPlan& plan, const gpu::DeviceInfo& device, Progress& progress)
       : options_(options),
         surfaces_(surfaces),
         plan_(plan),
         device_(device),
         progress_(progress),
-        loader_(store, options.level, surfaces.requests.front(), options.device),
+        loader_(loader),
         budget_(options.gpu_memory > 0 ? options.gpu_memory
                                        : device.free_bytes - device.free_bytes / 10) {}
 
@@ -45,7 +44,7 @@ class ResidentPass {
     if (sizes.volume_bytes + beside + kPieceOfDriver > budget_) return false;
     try {
       volume_.emplace(lattice(), common().surface.fill_value,
-                      gpu::DeviceTiles{tiles->searched, tiles->loaded}, 0);
+                      gpu::DeviceTiles{tiles->searched, tiles->loaded});
       read(tiles->loaded);
     } catch (const DamageError&) {
       throw;
@@ -175,7 +174,7 @@ class ResidentPass {
   const ExtractPlan& plan_;
   const gpu::DeviceInfo& device_;
   Progress& progress_;
-  DeviceLoader loader_;
+  DeviceLoader& loader_;
   std::uint64_t budget_;     ///< of device memory
   std::uint64_t shown_ = 0;  ///< progress of loading
   std::optional<gpu::DeviceVolume> volume_;
@@ -189,7 +188,7 @@ ResidentPassResult run_resident_pass(const StoreReader& store, const ExtractOpti
                                      std::uint64_t other_bytes,
                                      const std::function<void(std::size_t)>& begin,
                                      Progress& progress) {
-  const DeviceLoader loader(store, options.level, surfaces.requests.front(), options.device);
+  DeviceLoader loader(store, options.level, surfaces.requests.front(), options.device);
   const auto plan =
       plan_resident_memory(surfaces.requests, options.memory, other_bytes + loader.pinned_bytes());
   if (!plan) return {};
@@ -200,7 +199,7 @@ ResidentPassResult run_resident_pass(const StoreReader& store, const ExtractOpti
     } catch (const Error&) {
       return {};  // streaming, which is next, reports it
     }
-    ResidentPass pass(store, options, surfaces, *plan, device, progress);
+    ResidentPass pass(loader, options, surfaces, *plan, device, progress);
     const std::size_t made = pass.load(tiles) ? pass.make(begin) : 0;
     return {made, pass.progress_ahead(made)};
   });

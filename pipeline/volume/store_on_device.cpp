@@ -16,6 +16,7 @@
 #include "core/morton.h"
 #include "gpu/memory/device_scope.h"
 #include "gpu/tile/supported.h"
+#include "pipeline/extract/backend_choice.h"
 #include "pipeline/extract/device_loader.h"
 #include "pipeline/program_memory.h"
 #include "pipeline/workers.h"
@@ -71,7 +72,7 @@ class StoreLoad {
       check_room(tiles, device);
       auto volume = std::make_unique<gpu::DeviceVolume>(
           lattice(), request_.surface.fill_value, gpu::DeviceTiles{tiles.searched, tiles.loaded},
-          target);
+          &target);
       load(*volume, tiles.loaded, plan, progress);
       return StoreOnDevice{
           std::make_unique<gpu::CachedExtractor>(options_.device, request_.surface.transform,
@@ -84,11 +85,9 @@ class StoreLoad {
   static ExtractRequest checked(const StoreReader& store, const ExtractOptions& options) {
     if (options.backend == Backend::cpu)
       throw UsageError("surfaces on a device are made by the GPU");
-    const int devices = gpu::device_count();
+    const int devices = cuda_device_count();
     if (devices == 0) throw Error("there is no CUDA device here");
-    if (options.device < 0 || options.device >= devices)
-      throw UsageError(fmt::format("there is no CUDA device {}: there {} {}, from 0",
-                                   options.device, devices == 1 ? "is" : "are", devices));
+    check_cuda_device(options.device, devices);
     ExtractRequest request = check_request(store, options, Indexing::welded);
     gpu::check_supported(request.surface);
     return request;
@@ -99,7 +98,7 @@ class StoreLoad {
   ExtractPlan plan_host() const {
     const std::uint64_t others = decode_extra(store_.info(), request_.threads) +
                                  store_.storage()->memory() + loader_.pinned_bytes() +
-                                 kSearches * kSearchBytes;
+                                 kSearches * (kSearchBytes + request_.search_memory);
     const PassRequests requests{&request_, 1};
     if (const auto plan = plan_resident_memory(requests, options_.memory, others)) return *plan;
     throw UsageError(fmt::format(

@@ -1,10 +1,13 @@
 #include <gtest/gtest.h>
 
+#include <cstring>
 #include <map>
 #include <vector>
 
 #include "core/morton.h"
 #include "gpu/resident/resident_sizes.h"
+#include "gpu/resident/tile_loader.h"
+#include "gpu/stream/brick_pool.h"
 #include "surface/surface_extractor.h"
 #include "tests/gpu/resident.h"
 
@@ -17,6 +20,33 @@ template <class T>
 class GpuResidentPart : public DeviceTest<T> {};
 
 TYPED_TEST_SUITE(GpuResidentPart, DeviceTypes);
+
+/// Bricks that were sent to a pool on the device.
+class PoolBricks final : public BrickLookup {
+ public:
+  PoolBricks(const BrickLookup& all, const Lattice& lattice)
+      : grid_(lattice.bricks()),
+        pool_(0, lattice, static_cast<std::size_t>(volume(grid_)), 1),
+        places_(static_cast<std::size_t>(volume(grid_))) {
+    for_each_point({{0, 0, 0}, grid_}, [&](Int3 b) {
+      const std::byte* const from = all.find(b);
+      if (!from) return;
+      std::byte* const place = pool_.take(lattice.brick_bytes());
+      std::memcpy(pool_.begin(0), from, lattice.brick_bytes());
+      pool_.end(0, place);
+      places_[static_cast<std::size_t>(linear_index(b, grid_))] = place;
+    });
+  }
+  gpu::BrickPool& pool() { return pool_; }
+  const std::byte* find(Int3 b) const override {
+    return places_[static_cast<std::size_t>(linear_index(b, grid_))];
+  }
+
+ private:
+  Int3 grid_;
+  gpu::BrickPool pool_;
+  std::vector<std::byte*> places_;
+};
 
 /// Has only the bricks that some tiles lie in.
 class BricksOfTiles final : public BrickLookup {
@@ -54,6 +84,18 @@ std::vector<Int3> tiles_of(const Field<T>& field, const std::vector<double>& iso
   return list;
 }
 
+/// Some tiles at a time.
+void load(gpu::DeviceVolume& volume, const BrickLookup& bricks, const Lattice& lattice,
+          std::span<const Int3> tiles) {
+  constexpr std::size_t at_once = 7;
+  PoolBricks on_device(bricks, lattice);
+  gpu::TileLoader loader(volume, on_device.pool(), at_once);
+  for (std::size_t i = 0; i < tiles.size(); i += at_once) {
+    const auto some = tiles.subspan(i, std::min(at_once, tiles.size() - i));
+    loader.load(some, BricksOfTiles(on_device, lattice, some), nullptr);
+  }
+}
+
 /// Loads the tiles that are active at any isovalue and those beside them, some at a time, and
 /// compares the meshes of all isovalues.
 template <class T>
@@ -64,12 +106,8 @@ void compare_part(const Field<T>& field, const BrickLookup& bricks, const Lattic
   for (const bool normals : {false, true}) {
     options.normals = normals;
     const std::vector<Int3> loaded = gpu::tiles_to_load(lattice, searched, sample_reach(options));
-    gpu::DeviceVolume volume(lattice, options.fill_value, {searched, loaded},
-                             3 * 32768 * lattice.sample_bytes());
-    for (std::size_t i = 0; i < loaded.size(); i += 7) {
-      const auto some = std::span(loaded).subspan(i, std::min<std::size_t>(7, loaded.size() - i));
-      volume.load(some, BricksOfTiles(bricks, lattice, some));
-    }
+    gpu::DeviceVolume volume(lattice, options.fill_value, {searched, loaded});
+    load(volume, bricks, lattice, loaded);
     EXPECT_LE(
         volume.bytes(),
         gpu::resident_sizes(lattice, {searched.size(), loaded.size(), 0}, normals).volume_bytes);

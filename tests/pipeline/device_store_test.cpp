@@ -7,6 +7,7 @@
 #include <isobrick/device.h>
 #include <isobrick/device_extractor.h>
 #include <isobrick/error.h>
+#include <isobrick/index_build.h>
 #include "index/active_tiles.h"
 #include "surface/cpu_extractor.h"
 #include "tests/gpu/compare.h"
@@ -103,6 +104,32 @@ TEST_F(DeviceStore, ARegionOfALevel) {
   options.roi.reset();
   options.level = 0;
   EXPECT_THROW(extractor.extract(options), UsageError) << "is another level";
+}
+
+/// Range chunks of 1,024 samples are searched beside each other.
+TEST_F(DeviceStore, OfSeveralRangeChunks) {
+  for (const Int3 extent : {Int3{1100, 40, 1060}, Int3{2070, 33, 34}}) {
+    const auto opened = convert<std::uint8_t>(extent, BrickCodec::packed, 64);
+    for (const std::optional<Box3>& roi :
+         {std::optional<Box3>(), std::optional<Box3>({{1000, 2, 3}, {1050, 30, 34}}),
+          std::optional<Box3>({{1023, 2, 3}, {1025, 30, 34}})}) {
+      const ExtractOptions options{.isovalue = middle(*opened), .roi = roi};
+      testing::expect_same(on_cpu(*opened, options),
+                           extract_to_device(*opened, options).download());
+    }
+  }
+}
+
+TEST_F(DeviceStore, ByAnIndex) {
+  const auto opened = convert<std::uint16_t>({150, 140, 131}, BrickCodec::packed);
+  const ExtractOptions plain{.isovalue = middle(*opened)};
+  const isobrick::Mesh expected = on_cpu(*opened, plain);
+  const std::filesystem::path path = opened->storage()->local_path();
+  add_index(path, {.kind = IndexKind::octree, .threads = 2});
+  const StoreReader indexed(path);
+  ExtractOptions options = plain;
+  options.index = {.automatic = false, .kind = IndexKind::octree};
+  testing::expect_same(expected, extract_to_device(indexed, options).download());
 }
 
 TEST_F(DeviceStore, TheStoreIsNotNeededAnyMore) {
