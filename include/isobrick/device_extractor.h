@@ -55,8 +55,9 @@ class ISOBRICK_API DeviceExtractor {
   explicit DeviceExtractor(const DeviceArray& array);
   /// Reads the samples of a level to `options.device` and waits. Of the options, `level`, `roi`,
   /// `device`, `memory`, `gpu_memory`, `threads` and `cancel` matter; surfaces then lie within that
-  /// region of that level. The samples take a fifth more than their bytes of device memory. Throws
-  /// as extract() of a store does; UsageError where `gpu_memory` or `memory` is too small for them,
+  /// region of that level. The samples take a 32nd more than their bytes of device memory, and
+  /// while they are read a pool of bricks lies beside them, some hundred megabytes. Throws as
+  /// extract() of a store does; UsageError where `gpu_memory` or `memory` is too small for them,
   /// gpu::OutOfDeviceMemory where the device is; Error where there is no CUDA. The store is not
   /// needed any more afterwards.
   DeviceExtractor(const StoreReader& store, const ExtractOptions& options,
