@@ -2,7 +2,6 @@
 
 #include <cstdint>
 #include <string>
-#include <vector>
 
 #include <isobrick/mesh.h>
 #include "io/bytes/output_file.h"
@@ -28,15 +27,11 @@ class PlySink final : public MeshSink {
   std::uint64_t memory() const override { return memory_; }
 
  private:
-  std::string header_text() const;
-
   std::size_t memory_;
   OutputFile out_;    ///< header and vertices; the faces at the end
   FileWriter faces_;  ///< waits until all vertices are known
-  bool has_normals_ = false;
-  std::string unit_;
-  std::vector<std::string> attributes_;
-  std::uint64_t vertices_ = 0, triangles_ = 0;
+  MeshHeader header_;
+  MeshSize size_;
 };
 
 }  // namespace isobrick
