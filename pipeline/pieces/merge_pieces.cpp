@@ -185,21 +185,8 @@ class Merger {
     reader.read(triangles);
     open_.add(tile, vertices_);
     vertices_ += tile.vertices;
-    if (!renumber(triangles))
+    if (!open_.numbers().renumber(triangles, first_vertex_, vertices_ - first_vertex_))
       reader.fail("is damaged: a triangle names a vertex that is not there");
-  }
-
-  /// Numbers of a piece count from the vertices of its neighbours, then from its own.
-  bool renumber(std::span<Triangle> triangles) const {
-    const auto others = static_cast<std::uint64_t>(open_.neighbour_vertices());
-    const std::uint64_t end = others + vertices_ - first_vertex_;
-    const auto shift = static_cast<std::uint32_t>(first_vertex_ - others);  // may wrap
-    for (Triangle& triangle : triangles)
-      for (std::uint32_t& vertex : triangle) {
-        if (vertex >= end) return false;
-        vertex = vertex >= others ? vertex + shift : open_.number_of(vertex);
-      }
-    return true;
   }
 
   void hand_on() {

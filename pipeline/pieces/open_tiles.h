@@ -6,9 +6,13 @@
 
 #include <isobrick/vec.h>
 #include "core/tile_range.h"
+#include "pipeline/pieces/neighbour_numbers.h"
 #include "pipeline/pieces/piece_format.h"
 
 namespace isobrick::inline v0 {
+
+/// The last tile in the order that may use a vertex of this one, in a volume of `grid` tiles.
+std::uint64_t last_asker(std::uint64_t code, Int3 grid);
 
 /// The tiles of pieces before that pieces to come may name vertices of, and what the numbers of
 /// such vertices become. Memory follows the surface between pieces that were read and others.
@@ -24,9 +28,8 @@ class OpenTiles {
   void begin_piece(const TileRange& tiles, const std::vector<PieceTile>& neighbours);
   /// Whether all of the neighbours were there.
   bool fits() const { return fits_; }
-  std::uint64_t neighbour_vertices() const { return neighbour_vertices_; }
-  /// The number in the mesh of one of the neighbours' vertices.
-  std::uint32_t number_of(std::uint32_t vertex) const;
+  /// Those of the piece.
+  const NeighbourNumbers& numbers() const { return numbers_; }
   /// A tile of the piece; its first vertex has the number `first` in the mesh.
   void add(const PieceTile& tile, std::uint64_t first);
 
@@ -34,17 +37,11 @@ class OpenTiles {
   struct Open {
     std::uint32_t first, vertices;
   };
-  struct Neighbour {
-    std::uint64_t begin;  ///< its first vertex in the piece
-    std::uint32_t first;  ///< the same in the mesh
-  };
-  std::uint64_t last_asker(std::uint64_t code) const;
 
-  Int3 last_tile_;
+  Int3 grid_;
   std::uint64_t end_ = 0;  ///< of the piece
   std::unordered_map<std::uint64_t, Open> open_;
-  std::vector<Neighbour> neighbours_;
-  std::uint64_t neighbour_vertices_ = 0;
+  NeighbourNumbers numbers_;
   bool fits_ = true;
 };
 

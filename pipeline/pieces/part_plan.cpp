@@ -1,5 +1,6 @@
 #include "pipeline/pieces/part_plan.h"
 
+#include <algorithm>
 #include <bit>
 
 #include "core/box_union.h"
@@ -10,14 +11,14 @@
 namespace isobrick::inline v0 {
 namespace {
 
-/// Calls f(TileWork, number of active blocks) until it returns false. An index might find other
-/// tiles, which have no surface: ranges alone divide alike wherever there is one.
+/// Calls f(TileWork, number of active blocks). An index might find other tiles, which have no
+/// surface: ranges alone divide alike wherever there is one.
 template <class F>
 void visit_tiles(const StoreReader& store, const ExtractRequest& request, int level, F&& f) {
   TileStream tiles(store, level, {request.surface.isovalue}, request.surface.roi, {},
                    cap_search(request.surface));
   while (const auto work = tiles.next())
-    if (!f(*work, static_cast<std::uint64_t>(std::popcount(work->active_blocks)))) return;
+    f(*work, static_cast<std::uint64_t>(std::popcount(work->active_blocks)));
 }
 
 /// Of `all` blocks, how many lie before the end of the first `number` parts.
@@ -27,36 +28,42 @@ std::uint64_t blocks_before(std::uint64_t all, std::uint64_t number, std::uint64
 
 }  // namespace
 
-PartPlan plan_part(const StoreReader& store, const ExtractRequest& request, int level, Part part) {
+TileRange PartPlans::tiles(std::uint32_t number) const {
+  return {.begin = parts[number - 1].begin,
+          .end = number < parts.size() ? parts[number].begin : ~std::uint64_t{0},
+          .looks_around = looks_around,
+          .grid = grid};
+}
+
+std::uint32_t PartPlans::part_of(std::uint64_t code) const {
+  const auto after =
+      std::upper_bound(parts.begin(), parts.end(), code,
+                       [](std::uint64_t tile, const Plan& part) { return tile < part.begin; });
+  return static_cast<std::uint32_t>(after - parts.begin());
+}
+
+PartPlans plan_parts(const StoreReader& store, const ExtractRequest& request, int level,
+                     std::uint32_t count) {
+  PartPlans plans;
+  plans.parts.resize(count);
+  plans.parts.front().begin = 0;
+  plans.grid = request.level->lattice.tiles();
+  plans.looks_around = request.surface.drop_degenerate || request.surface.cap;
   std::uint64_t all = 0;
-  PartPlan plan;
   visit_tiles(store, request, level, [&](const TileWork& work, std::uint64_t blocks) {
     all += blocks;
     for_each_active_block(work, request.surface.roi,
-                          [&](Box3 cells) { plan.bounds = unite(plan.bounds, cells); });
-    return true;
+                          [&](Box3 cells) { plans.bounds = unite(plans.bounds, cells); });
   });
-  plan.tiles.grid = request.level->lattice.tiles();
-  plan.tiles.looks_around = request.surface.drop_degenerate || request.surface.cap;
-  const std::uint64_t first = blocks_before(all, part.number - 1, part.count);
-  const std::uint64_t last = blocks_before(all, part.number, part.count);
-  bool has_begun = part.number == 1;
-  if (!has_begun) plan.tiles.begin = ~std::uint64_t{0};
+  std::uint32_t begun = 1;
   std::uint64_t before = 0;
   visit_tiles(store, request, level, [&](const TileWork& work, std::uint64_t blocks) {
-    if (!has_begun && before >= first) {
-      has_begun = true;
-      plan.tiles.begin = morton_encode(work.tile);
-    }
-    if (part.number < part.count && before >= last) {
-      plan.tiles.end = morton_encode(work.tile);
-      return false;
-    }
-    if (has_begun) plan.active_blocks += blocks;
+    while (begun < count && before >= blocks_before(all, begun, count))
+      plans.parts[begun++].begin = morton_encode(work.tile);
+    plans.parts[begun - 1].active_blocks += blocks;
     before += blocks;
-    return true;
   });
-  return plan;
+  return plans;
 }
 
 }  // namespace isobrick

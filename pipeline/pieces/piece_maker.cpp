@@ -1,4 +1,4 @@
-#include <isobrick/pieces.h>
+#include "pipeline/pieces/piece_maker.h"
 
 #include <cmath>
 #include <filesystem>
@@ -12,7 +12,6 @@
 #include "pipeline/check_part.h"
 #include "pipeline/extract/extract_part.h"
 #include "pipeline/extract/mesh_header.h"
-#include "pipeline/pieces/part_plan.h"
 #include "pipeline/pieces/piece_reader.h"
 #include "pipeline/pieces/piece_writer.h"
 
@@ -87,19 +86,22 @@ std::optional<PieceEnd> find_piece(const std::filesystem::path& path, const std:
 
 }  // namespace
 
-PieceReport extract_piece(const StoreReader& store, const ExtractOptions& options, Part part,
-                          const std::filesystem::path& path, bool force, Progress& progress) {
-  check_part(part);
+PieceMaker::PieceMaker(const StoreReader& store, const ExtractOptions& options, std::uint32_t parts)
+    : store_(store), options_(options) {
+  check_part({1, parts});
   if (options.backend == Backend::cuda)
     throw UsageError("parts of a mesh are made on the CPU: leave out --backend cuda");
-  if (path.native() == kStandardOutput)
-    throw UsageError(
-        "a piece has a name, by which it is found again: it cannot go to standard output");
   const ExtractRequest request = check_request(store, options, Indexing::welded);
-  const PartPlan plan = plan_part(store, request, options.level, part);
-  const PieceDescription header{part, plan.tiles, mesh_json(store, request, options.level),
-                                mesh_header(request.level->transform, request.level->lattice.extent,
-                                            request.surface.normals, plan.bounds)};
+  plans_ = plan_parts(store, request, options.level, parts);
+  header_ = mesh_header(request.level->transform, request.level->lattice.extent,
+                        request.surface.normals, plans_.bounds);
+  mesh_ = mesh_json(store, request, options.level);
+}
+
+PieceReport PieceMaker::make(std::uint32_t number, const std::filesystem::path& path, bool force,
+                             Progress& progress) const {
+  const TileRange tiles = plans_.tiles(number);
+  const PieceDescription header{{number, plans_.count()}, tiles, mesh_, header_};
   PieceReport report;
   if (const auto end = find_piece(path, to_text(header), force)) {
     report.is_kept = true;
@@ -110,10 +112,19 @@ PieceReport extract_piece(const StoreReader& store, const ExtractOptions& option
     return report;
   }
   PieceWriter writer(path, header, true);
-  report.surface =
-      extract_part(store, options, {plan.tiles, &writer, plan.active_blocks}, writer, progress);
+  report.surface = extract_part(store_, options_, {tiles, &writer, plans_.active_blocks(number)},
+                                writer, progress);
   report.bytes = writer.end().bytes;
   return report;
+}
+
+PieceReport extract_piece(const StoreReader& store, const ExtractOptions& options, Part part,
+                          const std::filesystem::path& path, bool force, Progress& progress) {
+  check_part(part);
+  if (path.native() == kStandardOutput)
+    throw UsageError(
+        "a piece has a name, by which it is found again: it cannot go to standard output");
+  return PieceMaker(store, options, part.count).make(part.number, path, force, progress);
 }
 
 }  // namespace isobrick

@@ -14,6 +14,8 @@ namespace {
 
 /// Larger headers are none of ours.
 constexpr std::uint32_t kMaxHeader = 1 << 20;
+/// Read at once by those who pass over tiles.
+constexpr std::uint64_t kSmallBuffer = 4096;
 
 }  // namespace
 
@@ -60,7 +62,7 @@ void PieceReader::read_bytes(std::span<std::byte> bytes) {
         break;
       }
       buffer_.resize(kBuffer);
-      filled_ = std::min<std::uint64_t>(kBuffer, left());
+      filled_ = std::min<std::uint64_t>(skips_ ? kSmallBuffer : kBuffer, left());
       file_.read_at(at_, std::span(buffer_).first(filled_));
       begin_ = 0;
     }
@@ -86,7 +88,7 @@ bool PieceReader::next(PieceTile& tile) {
   if (tiles_ == end_.tiles) {
     if (left() != 0 || vertices_ != end_.vertices || triangles_ != end_.triangles)
       fail("is damaged");
-    if (crc_ != end_.content_crc32c) fail("is damaged: its checksum is another");
+    if (!skips_ && crc_ != end_.content_crc32c) fail("is damaged: its checksum is another");
     return false;
   }
   read(std::span(&tile, 1));
@@ -100,6 +102,14 @@ bool PieceReader::next(PieceTile& tile) {
   triangles_ += tile.triangles;
   last_code_ = tile.code;
   return true;
+}
+
+void PieceReader::skip(const PieceTile& tile) {
+  const std::uint64_t bytes = content_bytes(tile, header_.of_mesh.has_normals);
+  if (bytes > left()) fail("is damaged");
+  at_ += bytes;
+  begin_ += std::min<std::uint64_t>(bytes, filled_ - begin_);
+  skips_ = true;
 }
 
 void PieceReader::verify() {

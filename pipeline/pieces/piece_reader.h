@@ -27,13 +27,16 @@ class PieceReader {
 
   /// The tiles before the part; once, before the first next().
   std::vector<PieceTile> neighbours();
-  /// The next tile of the part; false at the end, where the checksum is compared.
+  /// The next tile of the part; false at the end, where the checksum is compared unless tiles were
+  /// passed over.
   bool next(PieceTile& tile);
   /// Fills what belongs to the tile, in the order of the piece.
   template <class T>
   void read(std::span<T> items) {
     read_bytes(std::as_writable_bytes(items));
   }
+  /// Passes over what belongs to the tile.
+  void skip(const PieceTile& tile);
   /// Reads the rest. Throws DamageError.
   void verify();
 
@@ -53,6 +56,7 @@ class PieceReader {
   std::uint64_t tiles_ = 0, vertices_ = 0, triangles_ = 0, last_code_ = 0;  ///< so far
   std::vector<std::byte> buffer_;
   std::size_t begin_ = 0, filled_ = 0;  ///< of the buffer
+  bool skips_ = false;
 };
 
 /// Whether a file begins as a piece does, or has no byte.
