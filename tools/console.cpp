@@ -46,6 +46,11 @@ void set_up_streams() {
 Console::Console(OutputMode mode)
     : mode_(mode), progress_(mode.quiet ? ProgressForm::none : mode.progress) {}
 
+void Console::mute() {
+  mode_ = {.json = false, .quiet = true, .progress = ProgressForm::none};
+  progress_.mute();
+}
+
 void Console::reserve_output() {
   if (mode_.json)
     throw UsageError("--json and the output '-' would both be on standard output; name a file");

@@ -40,6 +40,8 @@ class Console {
   void result(const nlohmann::ordered_json& object, std::string_view text);
   /// A result that is a text: {"command": …, "text": …}.
   void result_text(std::string_view command, std::string_view text);
+  /// From now on nothing is written but errors.
+  void mute();
   /// Whether an object was written: a command writes one, also where it then fails.
   bool wrote_object() const { return wrote_object_; }
   /// A remark beside the result.

@@ -13,6 +13,7 @@
 #include "tools/extract_labels.h"
 #include "tools/extract_part.h"
 #include "tools/extract_plan.h"
+#include "tools/job.h"
 #include "tools/output_name.h"
 #include "tools/value_range.h"
 
@@ -198,17 +199,34 @@ void note_band(double isovalue, const StoreInfo& info, Console& console) {
       isovalue, -*band, *band));
 }
 
+/// Opens the input. The first rank of a job adds what a store lacks before the others open it.
+OpenedVolume open_shared_input(const ExtractArguments& arguments, Ranks* job, Console& console) {
+  const auto open = [&] {
+    return open_input(arguments.input, arguments.memory, arguments.threads, console);
+  };
+  if (job == nullptr) return open();
+  if (!is_zarr(arguments.input.path))
+    throw UsageError(
+        fmt::format("'{}' is no store: make one for all ranks with 'isobrick convert' first",
+                    arguments.input.path));
+  if (job->rank() > 0) job->wait_for_all();
+  OpenedVolume input = open();
+  if (job->rank() == 0) job->wait_for_all();
+  return input;
+}
+
 int run_extract(const ExtractArguments& given, Console& console) {
   if (given.part) return run_extract_part(given, console);
   if (given.labels) return run_extract_labels(given, console);
   ExtractArguments arguments = with_preset(given);
   check_arguments(arguments);
+  Ranks* const job = arguments.estimate ? nullptr : join_job(arguments.mpi, console);
+  if (job != nullptr) share_machine(*job, arguments.memory, arguments.threads);
   const bool streams =
       is_standard_output(arguments.output) || is_standard_output(arguments.preview.path);
   if (streams && !arguments.estimate) console.reserve_output();
   if (!is_zarr(arguments.input.path)) check_outputs(arguments);
-  const OpenedVolume input =
-      open_input(arguments.input, arguments.memory, arguments.threads, console);
+  const OpenedVolume input = open_shared_input(arguments, job, console);
   const StoreReader& store = input.store();
   choose_mesh_unit(arguments, store, console);
   const AttributeVolumes attributes(arguments.attributes, arguments.input, arguments.memory,
@@ -220,8 +238,8 @@ int run_extract(const ExtractArguments& given, Console& console) {
   for (const ExtractedSurface& surface : surfaces)
     note_band(surface.options.isovalue, store.info(), console);
   const CommandOutput output = arguments.estimate ? estimate_all(surfaces, store, console)
-                               : arguments.resume
-                                   ? make_resumable(arguments, surfaces, store, console)
+                               : arguments.resume || job != nullptr
+                                   ? make_by_pieces(arguments, surfaces, store, job, console)
                                    : make_all(arguments, surfaces, store, attributes, console);
   ordered_json result{{"command", "extract"},
                       {"input", arguments.input.path},
@@ -229,7 +247,7 @@ int run_extract(const ExtractArguments& given, Console& console) {
                       {"estimate", arguments.estimate},
                       {"surfaces", output.objects}};
   if (!arguments.estimate) result["passes"] = output.passes;
-  result["peak_resident_bytes"] = peak_resident_bytes();
+  add_peak(job, result);
   console.result(result, output.text);
   return 0;
 }
@@ -360,6 +378,7 @@ void add_extract(Program& program) {
   add_flag(app, "--resume", arguments->resume,
            "Make the mesh by way of pieces in a folder beside it, and go on with those that an "
            "interrupted run left");
+  add_mpi(app, arguments->mpi);
   add_force(app, arguments->force);
   add_flag(app, "--no-space-check", arguments->no_space_check,
            "Begin even if, by the estimate, the disk is too small");

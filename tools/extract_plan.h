@@ -49,6 +49,7 @@ struct ExtractArguments {
   std::uint64_t gpu_memory = 0;
   int device = 0;
   bool estimate = false, force = false, no_space_check = false, resume = false;
+  bool mpi = true;  ///< the ranks of a job share the work
 
   /// Whether meshes are written.
   bool writes_mesh() const { return !output.empty() || (preview.path.empty() && !estimate); }

@@ -46,11 +46,12 @@ void claim_end() {
 void print_note() {
   Report& r = report();
   const std::lock_guard lock(r.mutex);
+  const std::string note = r.note ? r.note()
+                                  : "what was not finished is removed; run it again, with --force "
+                                    "where an output is there";
+  if (note.empty()) return;
   if (::isatty(STDERR_FILENO) == 1) std::fputs("\r\x1b[K", stderr);  // the rest of a bar
-  print_error(r.command,
-              "interrupted; " + (r.note ? r.note()
-                                        : "what was not finished is removed; run it "
-                                          "again, with --force where an output is there"));
+  print_error(r.command, "interrupted; " + note);
 }
 
 void watch() {

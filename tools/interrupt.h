@@ -31,7 +31,7 @@ int interrupting_signal();
 void throw_if_interrupted();
 
 /// From now on an interrupt is reported with the text that `note` returns: what is left, and how to
-/// go on. It is called from any thread.
+/// go on; nothing where that is "". It is called from any thread.
 void set_interrupt_note(std::function<std::string()> note);
 
 /// Reports the interrupt and ends the program as the signal would have ended it, so that shells see

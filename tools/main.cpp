@@ -14,6 +14,7 @@
 #include "tools/console.h"
 #include "tools/help.h"
 #include "tools/interrupt.h"
+#include "tools/job.h"
 #include "tools/options.h"
 #include "tools/settings.h"
 
@@ -89,6 +90,10 @@ int run_parsed(Program& program, CommandLine& line) {
   std::optional<Console> console;
   const auto fail = [&](const std::string& what, int exit_code) {
     line.json = line.json && !(console && console->wrote_object());
+    if (joined_job())
+      end_job(exit_code, [&](const std::string& prefix) {
+        report_failure(program, line, prefix + what, exit_code);
+      });
     return report_failure(program, line, what, exit_code);
   };
   try {
@@ -96,6 +101,7 @@ int run_parsed(Program& program, CommandLine& line) {
     set_up_signals(name_of(parsed(program)));
     console.emplace(program.mode);
     const int status = parsed(program)->run(*console);
+    leave_job();
     end_interrupts();
     return status;
   } catch (const CLI::ParseError& error) {
@@ -109,6 +115,7 @@ int run_parsed(Program& program, CommandLine& line) {
   } catch (const UsageError& error) {
     return fail(error.what(), 2);
   } catch (const std::bad_alloc&) {
+    if (joined_job()) return fail("out of memory; a smaller --memory may help", 1);
     print_out_of_memory(name_of(parsed(program)));
     if (line.json) print_error_json(name_of(parsed(program)), "out of memory", 1);
     return 1;

@@ -122,6 +122,12 @@ void ConsoleProgress::end() {
   throw_if_interrupted();
 }
 
+void ConsoleProgress::mute() {
+  erase();
+  form_ = ProgressForm::none;
+  writes_end_ = false;
+}
+
 void ConsoleProgress::write(Clock::time_point now) {
   last_ = now;
   const double seconds = std::chrono::duration<double>(now - start_).count();

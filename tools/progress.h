@@ -33,6 +33,8 @@ class ConsoleProgress final : public Progress {
   void begin(std::string_view stage, std::uint64_t total) override;
   void advance(std::uint64_t done) override;
   void end() override;
+  /// From now on it only throws.
+  void mute();
 
  private:
   using Clock = std::chrono::steady_clock;

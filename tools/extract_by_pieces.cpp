@@ -1,0 +1,271 @@
+#include <filesystem>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include <isobrick/error.h>
+#include <isobrick/pieces.h>
+#include "core/stopwatch.h"
+#include "io/bytes/output_guard.h"
+#include "pipeline/pieces/piece_maker.h"
+#include "ranks/write_ply.h"
+#include "tools/extract_part.h"
+#include "tools/interrupt.h"
+#include "tools/merge.h"
+#include "tools/output_name.h"
+
+namespace isobrick::tools {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::ordered_json;
+
+/// Active blocks of a piece: some hundred megabytes of mesh mostly, and seconds of work. Every
+/// piece searches the ranges of the volume once more, so that huge volumes have larger ones.
+constexpr std::uint64_t kBlocksOfPiece = std::uint64_t{1} << 13;
+constexpr std::uint64_t kMaxPieces = 500;
+
+/// Of one rank, so that no rank waits long for the last piece.
+constexpr std::uint64_t kPiecesOfRank = 4;
+constexpr std::uint64_t kFewestBlocks = 256;
+
+void check_piece_arguments(const ExtractArguments& arguments, const Ranks* job) {
+  const char* const reason = job != nullptr ? "several ranks" : "--resume";
+  const std::pair<bool, const char*> others[] = {
+      {!arguments.preview.path.empty(), "--preview"},
+      {arguments.backend == Backend::cuda, "--backend cuda"}};
+  for (const auto& [is_given, name] : others)
+    if (is_given)
+      throw UsageError(
+          fmt::format("{}: {} is not made by way of pieces: leave out one of them", reason, name));
+  if (is_standard_output(arguments.output))
+    throw UsageError(fmt::format("{}: pieces lie beside the mesh: name a file with -o", reason));
+}
+
+/// Without ranks by the surface alone, so that the next run finds the same parts.
+std::uint32_t count_parts(const StoreReader& store, ExtractOptions options, const Ranks* job) {
+  options.index = {.automatic = false, .kind = {}};
+  const std::uint64_t blocks = count_active(store, options).active_blocks;
+  const auto pieces = [&](std::uint64_t size) {
+    return std::max<std::uint64_t>(1, (blocks + size - 1) / size);
+  };
+  std::uint64_t parts = std::min(pieces(kBlocksOfPiece), kMaxPieces);
+  if (job != nullptr) {
+    const auto for_all = kPiecesOfRank * static_cast<std::uint64_t>(job->size());
+    parts = std::max(parts, std::min({for_all, pieces(kFewestBlocks), std::uint64_t{kMaxParts}}));
+  }
+  return static_cast<std::uint32_t>(parts);
+}
+
+/// What pieces took, as numbers that ranks can add up.
+struct PieceSums {
+  std::uint64_t kept = 0, vertices = 0, triangles = 0, degenerate = 0;
+  std::uint64_t bricks_read = 0, brick_reads = 0, bytes_read = 0, search_bytes = 0;
+  double seconds = 0, plan_seconds = 0, decode_seconds = 0, surface_seconds = 0, search_seconds = 0;
+  StageReport read = {}, decode = {}, surface = {}, sink = {};
+};
+
+void add(const StageReport& from, StageReport& to) {
+  to.seconds += from.seconds;
+  to.bytes += from.bytes;
+}
+
+void add(const PieceSums& from, PieceSums& to) {
+  to.kept += from.kept;
+  to.vertices += from.vertices;
+  to.triangles += from.triangles;
+  to.degenerate += from.degenerate;
+  to.bricks_read += from.bricks_read;
+  to.brick_reads += from.brick_reads;
+  to.bytes_read += from.bytes_read;
+  to.search_bytes += from.search_bytes;
+  to.seconds += from.seconds;
+  to.plan_seconds += from.plan_seconds;
+  to.decode_seconds += from.decode_seconds;
+  to.surface_seconds += from.surface_seconds;
+  to.search_seconds += from.search_seconds;
+  add(from.read, to.read);
+  add(from.decode, to.decode);
+  add(from.surface, to.surface);
+  add(from.sink, to.sink);
+}
+
+PieceSums sums_of(const PieceReport& piece) {
+  const ExtractReport& r = piece.surface;
+  return {.kept = piece.is_kept,
+          .vertices = r.vertices,
+          .triangles = r.triangles,
+          .degenerate = r.degenerate_triangles,
+          .bricks_read = r.bricks_read,
+          .brick_reads = r.brick_reads,
+          .bytes_read = r.bytes_read,
+          .search_bytes = r.search_bytes,
+          .seconds = r.seconds,
+          .plan_seconds = r.plan_seconds,
+          .decode_seconds = r.decode_seconds,
+          .surface_seconds = r.surface_seconds,
+          .search_seconds = r.search_seconds,
+          .read = r.read,
+          .decode = r.decode,
+          .surface = r.surface,
+          .sink = r.sink};
+}
+
+void put_sums(const PieceSums& sums, ExtractReport& r) {
+  r.bricks_read = sums.bricks_read;
+  r.brick_reads = sums.brick_reads;
+  r.bytes_read = sums.bytes_read;
+  r.search_bytes = sums.search_bytes;
+  r.plan_seconds = sums.plan_seconds;
+  r.decode_seconds = sums.decode_seconds;
+  r.surface_seconds = sums.surface_seconds;
+  r.search_seconds = sums.search_seconds;
+  r.read = sums.read;
+  r.decode = sums.decode;
+  r.surface = sums.surface;
+  r.sink = sums.sink;
+}
+
+/// The pieces of a surface.
+struct MadePieces {
+  fs::path folder;
+  std::vector<fs::path> paths;  ///< of all parts
+  std::vector<OwnPiece> own;    ///< those that this rank made
+  std::size_t kept = 0;
+  ExtractReport report;
+};
+
+MadePieces make_pieces(const ExtractedSurface& surface, const PieceMaker& maker, Ranks* job,
+                       Console& console) {
+  const std::uint32_t parts = maker.parts().count();
+  MadePieces made;
+  made.folder = surface.output;
+  made.folder += ".pieces";
+  std::error_code failure;
+  fs::create_directory(made.folder, failure);
+  if (failure) throw system_error("create", made.folder.string(), failure.value());
+  for (std::uint32_t i = 1; i <= parts; ++i)
+    made.paths.push_back(made.folder / fmt::format("{}of{}{}", i, parts, kPieceExtension));
+  PieceSums sums;
+  const auto make = [&](std::uint64_t i) {
+    const auto number = static_cast<std::uint32_t>(i + 1);
+    const PieceReport piece = maker.make(number, made.paths[i], false, console.progress());
+    made.report.bricks = piece.surface.bricks;
+    made.report.active_bricks = piece.surface.active_bricks;
+    made.report.index = piece.surface.index;
+    made.own.push_back({number, made.paths[i]});
+    add(sums_of(piece), sums);
+  };
+  if (job == nullptr) {
+    for (std::uint32_t i = 0; i < parts; ++i) make(i);
+  } else {
+    deal(*job, parts, make);
+    const auto all = job->gather(std::as_bytes(std::span(&sums, 1)));
+    sums = {};
+    for (const Ranks::Bytes& of_rank : all) add(to_items<PieceSums>(of_rank).front(), sums);
+  }
+  made.kept = sums.kept;
+  put_sums(sums, made.report);
+  made.report.degenerate_triangles = sums.degenerate;
+  return made;
+}
+
+/// The folder goes if nobody put anything else into it.
+void remove_pieces(const MadePieces& pieces) {
+  std::error_code ignored;
+  for (const auto& entry : fs::directory_iterator(pieces.folder, ignored))
+    if (entry.path().extension() == kPieceExtension) fs::remove(entry.path(), ignored);
+  fs::remove(pieces.folder, ignored);
+}
+
+/// Whether the ranks can write their pieces of the mesh as they are.
+bool is_written_by_all(const ExtractArguments& arguments, const ExtractedSurface& surface) {
+  return surface.form.format == MeshFormat::ply && !surface.filter.any() &&
+         arguments.attributes.empty();
+}
+
+/// What became of the pieces of a surface.
+MergeResult put_together(const ExtractArguments& arguments, const ExtractedSurface& surface,
+                         const PieceMaker& maker, const MadePieces& pieces, Ranks* job,
+                         Console& console) {
+  MergeResult made;
+  if (job != nullptr && is_written_by_all(arguments, surface)) {
+    const Stopwatch watch(made.seconds);
+    made.size = write_ply(*job, maker.parts(), pieces.own, maker.header(), surface.output,
+                          arguments.force, console.progress());
+    made.filtered.extracted = made.size;
+    made.bytes = mesh_bytes(surface.output);
+  } else if (job == nullptr || job->rank() == 0) {
+    made = merge({.pieces = pieces.paths,
+                  .output = surface.output,
+                  .form = surface.form,
+                  .filter = surface.filter,
+                  .attributes = arguments.attributes,
+                  .memory = arguments.memory,
+                  .threads = arguments.threads,
+                  .force = arguments.force,
+                  .no_space_check = arguments.no_space_check},
+                 console);
+  }
+  if (job == nullptr || job->rank() == 0) remove_pieces(pieces);
+  if (job != nullptr) job->wait_for_all();
+  return made;
+}
+
+/// Refuses what would stop the command after its work; of a job one rank looks.
+void check_outputs_of(const ExtractArguments& arguments,
+                      const std::vector<ExtractedSurface>& surfaces, const StoreReader& store,
+                      Ranks* job) {
+  if (job == nullptr || job->rank() == 0) {
+    if (!arguments.no_space_check) check_space(surfaces, store);
+    const std::vector<fs::path> inputs{arguments.input.path};
+    for (const ExtractedSurface& surface : surfaces) {
+      check_replaces_no_input(surface.output, inputs);
+      check_can_write_mesh(surface.output, surface.form.format, arguments.force);
+    }
+  }
+  if (job != nullptr) job->wait_for_all();
+}
+
+}  // namespace
+
+CommandOutput make_by_pieces(const ExtractArguments& arguments,
+                             const std::vector<ExtractedSurface>& surfaces,
+                             const StoreReader& store, Ranks* job, Console& console) {
+  check_piece_arguments(arguments, job);
+  check_outputs_of(arguments, surfaces, store, job);
+  if (job == nullptr || job->rank() == 0)
+    set_interrupt_note([] { return "the same command goes on with the pieces that are whole"; });
+  CommandOutput result;
+  std::vector<ExtractReport> reports;
+  std::vector<std::string> names;
+  for (const ExtractedSurface& surface : surfaces) {
+    double seconds = 0;
+    MergeResult made;
+    MadePieces pieces;
+    {
+      const Stopwatch watch(seconds);
+      const PieceMaker maker(store, surface.options, count_parts(store, surface.options, job));
+      pieces = make_pieces(surface, maker, job, console);
+      made = put_together(arguments, surface, maker, pieces, job, console);
+    }
+    ExtractReport& report = pieces.report;
+    report.triangles = made.size.triangles;
+    report.vertices = made.size.vertices;
+    report.seconds = seconds;
+    report.pass = reports.size();
+    ordered_json object = report_json(surface, report, made.filtered, made.bytes);
+    object["pieces"] = {{"total", pieces.paths.size()}, {"kept", pieces.kept}};
+    result.objects.push_back(std::move(object));
+    result.text += report_text(surface, report, made.filtered, made.bytes, true);
+    if (pieces.kept > 0)
+      result.text +=
+          fmt::format("  went on with {} of {} pieces\n", pieces.kept, pieces.paths.size());
+    reports.push_back(report);
+    names.push_back(surface.output.string());
+  }
+  result.passes = passes_json(passes_of(reports, names));
+  return result;
+}
+
+}  // namespace isobrick::tools
