@@ -1,16 +1,19 @@
 #include <isobrick/convert.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <memory>
 
 #include <fmt/format.h>
 
 #include <isobrick/error.h>
+#include "core/stopwatch.h"
 #include "io/bytes/output_folder.h"
 #include "pipeline/convert/convert_staging.h"
 #include "pipeline/convert/store_source.h"
 #include "tools/input.h"
 #include "tools/interrupt.h"
+#include "tools/job.h"
 #include "tools/output_name.h"
 
 namespace isobrick::tools {
@@ -21,14 +24,21 @@ struct ConvertArguments {
   VolumeRequest volume;
   RegionArguments region;
   ConvertOptions store;
+  bool mpi = true;  ///< the ranks of a job share the work
 };
 
-std::unique_ptr<VolumeSource> open_input(const ConvertArguments& arguments) {
+/// Samples of a part that ranks share, as many as a unit of parts has. By the volume alone, so that
+/// the next run finds the same parts.
+constexpr std::uint64_t kPartSamples = std::uint64_t{512} * 512 * 512;
+constexpr std::uint64_t kMostParts = 4096;
+
+std::unique_ptr<VolumeSource> open_input(const ConvertArguments& arguments,
+                                         const ConvertOptions& options) {
   VolumeRequest volume = arguments.volume;
   volume.roi = arguments.region.roi;
   volume.region = arguments.region.region;
-  volume.memory = arguments.store.memory;
-  volume.threads = arguments.store.threads;
+  volume.memory = options.memory;
+  volume.threads = options.threads;
   return open_any_source(arguments.in, volume);
 }
 
@@ -62,15 +72,42 @@ ConvertReport convert_stream(VolumeSource& source, const std::string& out,
   }
 }
 
+/// The ranks make all parts, and the first one joins them.
+ConvertReport convert_by_ranks(VolumeSource& source, const std::string& out, ConvertOptions options,
+                               Ranks& job, Console& console) {
+  const auto samples = static_cast<std::uint64_t>(volume(source.info().extent));
+  const auto parts = static_cast<std::uint32_t>(
+      std::clamp<std::uint64_t>((samples + kPartSamples - 1) / kPartSamples, 1, kMostParts));
+  ConvertReport report;
+  double seconds = 0;
+  {
+    const Stopwatch watch(seconds);
+    deal(job, parts, [&](std::uint64_t i) {
+      options.part = Part{static_cast<std::uint32_t>(i + 1), parts};
+      convert(source, out, options, console.progress());
+    });
+    job.wait_for_all();
+    options.part.reset();
+    options.join = parts;
+    if (job.rank() == 0) report = convert(source, out, options, console.progress());
+    job.wait_for_all();
+  }
+  report.seconds = seconds;
+  return report;
+}
+
 int run_convert(const ConvertArguments& arguments, Console& console) {
   const std::string out = arguments.out.empty()
                               ? stem_of_input(arguments.in, arguments.volume) + ".zarr"
                               : arguments.out;
   check_store_name(out);
-  const auto source = open_input(arguments);
   ConvertOptions options = arguments.store;
+  const bool is_whole = !options.part && options.join == 0;
+  Ranks* const job = is_whole ? join_job(arguments.mpi, console) : nullptr;
+  if (job != nullptr) share_machine(*job, options.memory, options.threads);
+  const auto source = open_input(arguments, options);
   options.inputs = input_paths(arguments.in);
-  if (options.part)
+  if (options.part || job != nullptr)
     set_interrupt_note([] { return "the same command goes on with what is done"; });
   else
     note_conversion(out);
@@ -79,9 +116,10 @@ int run_convert(const ConvertArguments& arguments, Console& console) {
         "it is a label image, and --downsample mean makes labels of coarser levels that none of "
         "its "
         "samples has; mode, the default, does not");
-  const ConvertReport report = arguments.in == "-"
-                                   ? convert_stream(*source, out, options, console)
-                                   : convert(*source, out, options, console.progress());
+  const ConvertReport report =
+      job != nullptr        ? convert_by_ranks(*source, out, options, *job, console)
+      : arguments.in == "-" ? convert_stream(*source, out, options, console)
+                            : convert(*source, out, options, console.progress());
   const std::string made =
       options.part ? fmt::format("{}.parts/{}of{}", out, options.part->number, options.part->count)
                    : out;
@@ -118,6 +156,7 @@ void add_convert(Program& program) {
                return static_cast<std::uint32_t>(parse_int(text, 1, kMaxParts));
              },
              {"--join", "N", "Make the store of all N parts, which are there; reads no samples"});
+  add_mpi(app, arguments->mpi);
   add_run(program, app, arguments, run_convert);
 }
 

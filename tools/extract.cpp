@@ -14,6 +14,7 @@
 #include "tools/extract_part.h"
 #include "tools/extract_plan.h"
 #include "tools/job.h"
+#include "tools/open_store.h"
 #include "tools/output_name.h"
 #include "tools/value_range.h"
 
@@ -205,10 +206,8 @@ OpenedVolume open_shared_input(const ExtractArguments& arguments, Ranks* job, Co
     return open_input(arguments.input, arguments.memory, arguments.threads, console);
   };
   if (job == nullptr) return open();
-  if (!is_zarr(arguments.input.path))
-    throw UsageError(
-        fmt::format("'{}' is no store: make one for all ranks with 'isobrick convert' first",
-                    arguments.input.path));
+  // A conversion of each rank would cost more than the surface.
+  check_store(arguments.input.path);
   if (job->rank() > 0) job->wait_for_all();
   OpenedVolume input = open();
   if (job->rank() == 0) job->wait_for_all();

@@ -150,7 +150,6 @@ MadePieces make_pieces(const ExtractedSurface& surface, const PieceMaker& maker,
   const auto make = [&](std::uint64_t i) {
     const auto number = static_cast<std::uint32_t>(i + 1);
     const PieceReport piece = maker.make(number, made.paths[i], false, console.progress());
-    made.report.bricks = piece.surface.bricks;
     made.report.active_bricks = piece.surface.active_bricks;
     made.report.index = piece.surface.index;
     made.own.push_back({number, made.paths[i]});
@@ -195,6 +194,8 @@ MergeResult put_together(const ExtractArguments& arguments, const ExtractedSurfa
                           arguments.force, console.progress());
     made.filtered.extracted = made.size;
     made.bytes = mesh_bytes(surface.output);
+    if (made.size.triangles == 0)
+      console.note(fmt::format("isovalue {}: the surface is empty", surface.options.isovalue));
   } else if (job == nullptr || job->rank() == 0) {
     made = merge({.pieces = pieces.paths,
                   .output = surface.output,
@@ -234,8 +235,7 @@ CommandOutput make_by_pieces(const ExtractArguments& arguments,
                              const StoreReader& store, Ranks* job, Console& console) {
   check_piece_arguments(arguments, job);
   check_outputs_of(arguments, surfaces, store, job);
-  if (job == nullptr || job->rank() == 0)
-    set_interrupt_note([] { return "the same command goes on with the pieces that are whole"; });
+  set_interrupt_note([] { return "the same command goes on with the pieces that are whole"; });
   CommandOutput result;
   std::vector<ExtractReport> reports;
   std::vector<std::string> names;
@@ -250,6 +250,9 @@ CommandOutput make_by_pieces(const ExtractArguments& arguments,
       made = put_together(arguments, surface, maker, pieces, job, console);
     }
     ExtractReport& report = pieces.report;
+    const LevelInfo& level = store.info().levels[static_cast<std::size_t>(surface.options.level)];
+    report.bricks = static_cast<std::uint64_t>(volume(level.lattice.bricks()));
+    report.bricks_read = std::min(report.bricks_read, report.bricks);  // some for several pieces
     report.triangles = made.size.triangles;
     report.vertices = made.size.vertices;
     report.seconds = seconds;

@@ -30,6 +30,7 @@ struct Report {
   std::mutex mutex;
   std::string command;
   std::function<std::string()> note;
+  bool is_mute = false;
 };
 
 /// Never destroyed: the watching thread may outlive main().
@@ -46,12 +47,12 @@ void claim_end() {
 void print_note() {
   Report& r = report();
   const std::lock_guard lock(r.mutex);
-  const std::string note = r.note ? r.note()
-                                  : "what was not finished is removed; run it again, with --force "
-                                    "where an output is there";
-  if (note.empty()) return;
+  if (r.is_mute) return;
   if (::isatty(STDERR_FILENO) == 1) std::fputs("\r\x1b[K", stderr);  // the rest of a bar
-  print_error(r.command, "interrupted; " + note);
+  print_error(r.command,
+              "interrupted; " + (r.note ? r.note()
+                                        : "what was not finished is removed; run it "
+                                          "again, with --force where an output is there"));
 }
 
 void watch() {
@@ -93,6 +94,11 @@ void set_up_signals(std::string_view command) {
 void set_interrupt_note(std::function<std::string()> note) {
   const std::lock_guard lock(report().mutex);
   report().note = std::move(note);
+}
+
+void mute_interrupts() {
+  const std::lock_guard lock(report().mutex);
+  report().is_mute = true;
 }
 
 void end_by_signal(int signal) {

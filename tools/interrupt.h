@@ -31,8 +31,11 @@ int interrupting_signal();
 void throw_if_interrupted();
 
 /// From now on an interrupt is reported with the text that `note` returns: what is left, and how to
-/// go on; nothing where that is "". It is called from any thread.
+/// go on. It is called from any thread.
 void set_interrupt_note(std::function<std::string()> note);
+
+/// From now on an interrupt is not reported: another process of the same command does that.
+void mute_interrupts();
 
 /// Reports the interrupt and ends the program as the signal would have ended it, so that shells see
 /// it. Returns only if the signal is ignored.

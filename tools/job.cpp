@@ -46,7 +46,7 @@ Ranks* join_job(bool shares, Console& console) {
   job() = join_ranks();
   if (job()->rank() > 0) {
     console.mute();
-    set_interrupt_note([] { return std::string(); });
+    mute_interrupts();
   }
   return job().get();
 }
