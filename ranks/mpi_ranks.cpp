@@ -132,6 +132,9 @@ class Dealer {
 class Session {
  public:
   Session() {
+    // Of the ways to share a place in a file, which nothing here does, Open MPI tries one with a
+    // file beside the output. A killed rank would leave it.
+    ::setenv("OMPI_MCA_sharedfp", "^lockedfile", 0);
     int provided = 0;
     MPI_Init_thread(nullptr, nullptr, MPI_THREAD_MULTIPLE, &provided);
     if (provided < MPI_THREAD_MULTIPLE) {

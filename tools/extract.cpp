@@ -218,8 +218,8 @@ int run_extract(const ExtractArguments& given, Console& console) {
   if (given.part) return run_extract_part(given, console);
   if (given.labels) return run_extract_labels(given, console);
   ExtractArguments arguments = with_preset(given);
-  check_arguments(arguments);
   Ranks* const job = arguments.estimate ? nullptr : join_job(arguments.mpi, console);
+  check_arguments(arguments);
   if (job != nullptr) share_machine(*job, arguments.memory, arguments.threads);
   const bool streams =
       is_standard_output(arguments.output) || is_standard_output(arguments.preview.path);

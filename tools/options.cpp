@@ -15,6 +15,7 @@
 #include "tools/format.h"
 #include "tools/index_options.h"
 #include "tools/interrupt.h"
+#include "tools/job.h"
 
 namespace isobrick::tools {
 
@@ -293,7 +294,7 @@ void report_conversion(Console& console, const std::string& command, const std::
                                                    static_cast<double>(report.bytes_out);
   const double rate =
       report.seconds > 0 ? static_cast<double>(report.bytes_in) / report.seconds : 0;
-  const nlohmann::ordered_json object{
+  nlohmann::ordered_json object{
       {"command", command},
       {"input", input},
       {"output", output},
@@ -311,8 +312,8 @@ void report_conversion(Console& console, const std::string& command, const std::
       {"codec_sample", codec_sample_json(report.codec_sample)},
       {"seconds", report.seconds},
       {"index_seconds", report.index_seconds},
-      {"notes", notes},
-      {"peak_resident_bytes", peak_resident_bytes()}};
+      {"notes", notes}};
+  add_peak(joined_job(), object);
   std::string text = fmt::format("{}: {} samples of {}", output, human_extent(volume.extent),
                                  zarr_name(volume.type));
   if (report.levels > 0)  // a store and no raw file

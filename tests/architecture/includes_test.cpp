@@ -31,6 +31,7 @@ const std::map<std::string, Names> kMayInclude = {
     {"stream", {"core", "bricks", "index"}},
     {"gpu", {"core", "surface", "index", "packed"}},
     {"pipeline", {"core", "io/bytes", "io/volumes", "bricks", "index", "surface", "stream", "gpu"}},
+    {"ranks", {"core", "io/bytes", "io/meshes", "bricks", "surface", "pipeline"}},
     {"viewer/scene",
      {"core", "io/volumes", "bricks", "index", "surface", "stream", "gpu", "pipeline"}},
     {"viewer/render", {"core", "io/bytes", "io/meshes", "isobrick/mesh.h"}},
@@ -127,7 +128,7 @@ bool allowed(const std::string& folder, const std::string& name) {
 /// Calls f(path, its room) for each source file of the library.
 void for_each_file(const std::function<void(const fs::path&, const std::string&)>& f) {
   for (const char* top : {"include", "core", "io", "filters", "bricks", "index", "surface", "gpu",
-                          "stream", "pipeline", "viewer"})
+                          "stream", "pipeline", "ranks", "viewer"})
     for (const auto& entry : fs::recursive_directory_iterator(kRoot / top)) {
       if (!entry.is_regular_file() || !is_source(entry.path())) continue;
       const fs::path name = fs::relative(entry.path(), kRoot);

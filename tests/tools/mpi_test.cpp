@@ -1,0 +1,232 @@
+#include <algorithm>
+#include <csignal>
+
+#include <fmt/format.h>
+
+#include "tests/tools/program.h"
+
+// Commands that the ranks of mpirun share.
+
+namespace isobrick::test {
+namespace {
+
+namespace fs = std::filesystem;
+
+class Mpi : public ProgramTest {
+ protected:
+  void SetUp() override {
+    if (!available("mpirun")) GTEST_SKIP() << "mpirun is not installed";
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+    GTEST_SKIP() << "MPI leaks memory of its own";
+#endif
+    run_json({"synth", "gyroid", path("g.zarr"), "--dims", "150,130,170", "--type", "u8", "--brick",
+              "32", "--levels", "2"});
+    if (mpirun(1, {"--version"}).err.find("not built") != std::string::npos)
+      GTEST_SKIP() << "built without MPI";
+  }
+
+  /// Tests may run as root, on fewer cores than ranks.
+  static Arguments launch(int ranks) {
+    return {"env",
+            "OMPI_ALLOW_RUN_AS_ROOT=1",
+            "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1",
+            "mpirun",
+            "--oversubscribe",
+            "--bind-to",
+            "none",
+            "-n",
+            std::to_string(ranks),
+            ISOBRICK_PROGRAM};
+  }
+  static Outcome mpirun(int ranks, const Arguments& arguments) {
+    Arguments words = launch(ranks);
+    words.insert(words.end(), arguments.begin(), arguments.end());
+    return run_process(words);
+  }
+  /// The one object on standard output.
+  static nlohmann::json mpirun_json(int ranks, Arguments arguments) {
+    arguments.push_back("--json");
+    const Outcome outcome = mpirun(ranks, arguments);
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+    EXPECT_EQ(outcome.err, "");
+    EXPECT_EQ(std::count(outcome.out.begin(), outcome.out.end(), '\n'), 1) << outcome.out;
+    return nlohmann::json::parse(outcome.out, nullptr, false);
+  }
+  Arguments extract(const std::string& name, const Arguments& more = {}) const {
+    Arguments words{"extract", path("g.zarr"), "--isovalue", "120", "-o", path(name)};
+    words.insert(words.end(), more.begin(), more.end());
+    return words;
+  }
+  /// The lines that the program wrote, without those of mpirun.
+  static std::vector<std::string> own_lines(const std::string& text) {
+    std::vector<std::string> lines;
+    for (std::size_t at = 0; at < text.size();) {
+      const std::size_t end = std::min(text.find('\n', at), text.size());
+      if (text.compare(at, 9, "isobrick ") == 0) lines.push_back(text.substr(at, end - at));
+      at = end + 1;
+    }
+    return lines;
+  }
+};
+
+TEST_F(Mpi, RanksMakeTheMeshOfOneProcess) {
+  for (const Arguments& more :
+       {Arguments{}, {"--normals", "--roi", "10:140,0:130,31:170"}, {"--level", "1"}}) {
+    run_json(extract("one.ply", more));
+    const auto made = mpirun_json(3, extract("ranks.ply", more));
+    EXPECT_EQ(made["ranks"]["total"], 3);
+    EXPECT_GT(made["ranks"]["received_bytes"], 0);
+    EXPECT_GE(made["surfaces"][0]["pieces"]["total"], more.empty() ? 3 : 1);
+    EXPECT_TRUE(read_file(path("ranks.ply")) == read_file(path("one.ply")));
+    EXPECT_EQ(files(), (std::vector<std::string>{"g.zarr", "one.ply", "ranks.ply"}));
+    fs::remove(path("ranks.ply"));
+    fs::remove(path("one.ply"));
+  }
+}
+
+TEST_F(Mpi, EveryFormatAndFilterIsThatOfOneProcess) {
+  for (const Arguments& form : {Arguments{"m.vtp"},
+                                {"m.glb", "--quantize", "--simplify", "50%"},
+                                {"m.ply", "--largest", "1", "--measure"}}) {
+    const Arguments more(form.begin() + 1, form.end());
+    run_json(extract("one_" + form[0], more));
+    mpirun_json(2, extract("ranks_" + form[0], more));
+    EXPECT_TRUE(read_file(path("ranks_" + form[0])) == read_file(path("one_" + form[0])))
+        << form[0];
+  }
+}
+
+TEST_F(Mpi, SeveralIsovaluesAreSeveralMeshes) {
+  const Arguments words{"extract", path("g.zarr"), "--isovalue", "90,120", "-o"};
+  const auto with = [&](const std::string& name) {
+    Arguments all = words;
+    all.push_back(path(name));
+    return all;
+  };
+  run_json(with("one.ply"));
+  mpirun_json(3, with("ranks.ply"));
+  for (const char* isovalue : {"90", "120"})
+    EXPECT_TRUE(read_file(path(fmt::format("ranks_{}.ply", isovalue))) ==
+                read_file(path(fmt::format("one_{}.ply", isovalue))));
+}
+
+TEST_F(Mpi, ConvertMakesTheStoreOfOneProcess) {
+  // Two units, of 512 samples along x.
+  write_file(path("v.raw"), noise(std::size_t{600} * 20 * 20));
+  const Arguments form{"--dims", "600,20,20", "--type", "u8"};
+  const auto convert = [&](const std::string& name) {
+    Arguments words{"convert", path("v.raw"), path(name)};
+    words.insert(words.end(), form.begin(), form.end());
+    return words;
+  };
+  run_json(convert("one.zarr"));
+  const auto made = mpirun_json(2, convert("ranks.zarr"));
+  EXPECT_EQ(made["ranks"]["total"], 2);
+  std::size_t compared = 0;
+  for (const auto& entry : fs::recursive_directory_iterator(path("one.zarr")))
+    if (entry.is_regular_file()) {
+      ++compared;
+      EXPECT_TRUE(read_file(entry.path()) ==
+                  read_file(path("ranks.zarr") / fs::relative(entry.path(), path("one.zarr"))))
+          << entry.path();
+    }
+  EXPECT_GT(compared, 5u);
+  EXPECT_EQ(files(), (std::vector<std::string>{"g.zarr", "one.zarr", "ranks.zarr", "v.raw"}));
+}
+
+TEST_F(Mpi, AFailureIsReportedOnce) {
+  write_file(path("there.ply"), "mine");
+  const struct {
+    Arguments words;
+    int exit_code;
+    std::string line;
+  } cases[] = {
+      {extract("there.ply"), 2, "there.ply' exists already"},
+      {{"extract", path("none.zarr"), "--isovalue", "1", "-o", path("m.ply")},
+       1,
+       "nothing has that name"},
+      {extract("m.ply", {"--preview", path("m.png")}), 2, "--preview"},
+      {{"extract", path("g.zarr"), "--isovalue", "120", "-o", "-"}, 2, "name a file"},
+      {{"convert", "-", path("s.zarr"), "--dims", "2,2,2", "--type", "u8"}, 2, "not a stream"}};
+  for (const auto& [words, exit_code, line] : cases) {
+    const Outcome outcome = mpirun(3, words);
+    EXPECT_EQ(outcome.exit_code, exit_code) << outcome.err;
+    const std::vector<std::string> lines = own_lines(outcome.err);
+    ASSERT_GE(lines.size(), 1u) << outcome.err;
+    EXPECT_NE(lines.front().find(line), std::string::npos) << outcome.err;
+    EXPECT_EQ(std::count_if(lines.begin(), lines.end(),
+                            [&](const std::string& l) { return l.find(line) != l.npos; }),
+              1)
+        << outcome.err;
+  }
+  EXPECT_EQ(read_file(path("there.ply")), "mine");
+  EXPECT_EQ(files(), (std::vector<std::string>{"g.zarr", "there.ply"}));
+}
+
+TEST_F(Mpi, ADamagedBrickEndsTheJob) {
+  for (const auto& entry : fs::recursive_directory_iterator(path("g.zarr/0/c")))
+    if (entry.is_regular_file()) {
+      std::string bytes = read_file(entry.path());
+      for (std::size_t i = bytes.size() / 4; i < bytes.size() / 4 + 64; ++i) bytes[i] ^= 0x55;
+      write_file(entry.path(), bytes);
+    }
+  const Outcome outcome = mpirun(3, extract("m.ply"));
+  EXPECT_EQ(outcome.exit_code, 1);
+  const std::vector<std::string> lines = own_lines(outcome.err);
+  ASSERT_GE(lines.size(), 1u) << outcome.err;
+  EXPECT_NE(lines.front().find(": rank "), std::string::npos) << lines.front();
+  EXPECT_NE(lines.front().find("brick ("), std::string::npos) << lines.front();
+  EXPECT_FALSE(fs::exists(path("m.ply")));
+}
+
+/// A rank is killed at one of its renames and removals: the job ends, and the same command goes on.
+TEST_F(Mpi, AKilledRankEndsTheJobAndThePiecesAreKept) {
+  run_json(extract("one.ply"));
+  int killed = 0;
+  std::uint64_t kept = 0;
+  for (const int at : {1, 3, 5}) {
+    Arguments words = launch(1);
+    const Arguments arguments = extract("m.ply");
+    words.insert(words.end(), arguments.begin(), arguments.end());
+    const Arguments other{":",
+                          "-n",
+                          "1",
+                          "env",
+                          std::string("LD_PRELOAD=") + ISOBRICK_KILL_AT_LIBRARY,
+                          fmt::format("ISOBRICK_KILL_AT={}", at),
+                          ISOBRICK_PROGRAM};
+    words.insert(words.end(), other.begin(), other.end());
+    words.insert(words.end(), arguments.begin(), arguments.end());
+    const Outcome outcome = run_process(words);
+    if (outcome.exit_code == 0) {
+      fs::remove(path("m.ply"));
+      continue;
+    }
+    ++killed;
+    EXPECT_EQ(outcome.exit_code, 128 + SIGKILL) << outcome.err;
+    if (fs::exists(path("m.ply"))) {  // MPI removes files of its own at the end
+      EXPECT_TRUE(read_file(path("m.ply")) == read_file(path("one.ply")));
+      fs::remove(path("m.ply"));
+    }
+    const auto made = mpirun_json(2, extract("m.ply"));
+    kept += made["surfaces"][0]["pieces"]["kept"].get<std::uint64_t>();
+    EXPECT_TRUE(read_file(path("m.ply")) == read_file(path("one.ply")));
+    EXPECT_EQ(files(), (std::vector<std::string>{"g.zarr", "m.ply", "one.ply"})) << at;
+    fs::remove(path("m.ply"));
+  }
+  EXPECT_GT(killed, 1);
+  EXPECT_GT(kept, 0u);
+}
+
+TEST_F(Mpi, WithoutItEachRankWorksAlone) {
+  const Outcome outcome =
+      mpirun(2, {"extract", path("g.zarr"), "--isovalue", "120", "--estimate", "--json"});
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_EQ(std::count(outcome.out.begin(), outcome.out.end(), '\n'), 2);
+  const auto parts = mpirun(1, extract("m.ply", {"--mpi", "off"}));
+  EXPECT_EQ(parts.exit_code, 0) << parts.err;
+  expect_refused(run(extract("n.ply", {"--mpi", "on"})), 2, {"--mpi", "auto or off"});
+}
+
+}  // namespace
+}  // namespace isobrick::test
