@@ -34,7 +34,7 @@ struct ScannedPiece {
 };
 
 ScannedPiece scan(const OwnPiece& piece, const PartPlans& parts) {
-  PieceReader reader(piece.path);
+  PieceReader reader(piece.bytes);
   ScannedPiece scanned;
   scanned.size = {piece.number, reader.end().vertices, reader.end().triangles};
   scanned.neighbours = reader.neighbours();
@@ -126,7 +126,7 @@ PiecePlaces find_places(Ranks& ranks, const PartPlans& parts, std::span<const Ow
       const PartPlace& part = places[parts.part_of(neighbour.code) - 1];
       const OpenTile& tile = tiles[part.rank].at(taken[part.rank]++);
       if (tile.vertices != neighbour.vertices)
-        PieceReader(pieces[i].path).fail("does not fit the pieces before it");
+        PieceReader(pieces[i].bytes).fail("does not fit the pieces before it");
       place.numbers.add(tile.vertices,
                         static_cast<std::uint32_t>(part.before.vertices + tile.first));
     }

@@ -1,13 +1,14 @@
 #pragma once
 
 #include <cstdint>
-#include <filesystem>
+#include <memory>
 #include <span>
 #include <vector>
 
 #include <isobrick/mesh.h>
 #include "pipeline/pieces/neighbour_numbers.h"
 #include "pipeline/pieces/part_plan.h"
+#include "pipeline/pieces/piece_bytes.h"
 #include "ranks/ranks.h"
 
 namespace isobrick::inline v0 {
@@ -15,7 +16,7 @@ namespace isobrick::inline v0 {
 /// A piece that this rank made.
 struct OwnPiece {
   std::uint32_t number = 0;  ///< of its part
-  std::filesystem::path path;
+  std::shared_ptr<PieceBytes> bytes;
 };
 
 /// Where a piece goes in the mesh.

@@ -51,7 +51,7 @@ class PieceCopy {
         faces_at_(vertices_at_ + mesh.vertices * row_) {}
 
   void copy(const OwnPiece& piece, const PiecePlace& place, Progress& progress) {
-    PieceReader reader(piece.path);
+    PieceReader reader(piece.bytes);
     reader.neighbours();
     RunWriter vertices(file_, vertices_at_ + place.before.vertices * row_);
     RunWriter faces(file_, faces_at_ + place.before.triangles * kPlyFaceBytes);
@@ -94,13 +94,13 @@ class PieceCopy {
 
 std::uint64_t bytes_of(std::span<const OwnPiece> pieces) {
   std::uint64_t bytes = 0;
-  for (const OwnPiece& piece : pieces) bytes += PieceReader(piece.path).end().bytes;
+  for (const OwnPiece& piece : pieces) bytes += piece.bytes->size();
   return bytes;
 }
 
 }  // namespace
 
-MeshSize write_ply(Ranks& ranks, const PartPlans& parts, std::span<const OwnPiece> pieces,
+MeshSize write_ply(Ranks& ranks, const PartPlans& parts, std::vector<OwnPiece> pieces,
                    const MeshHeader& header, const std::filesystem::path& path, bool force,
                    Progress& progress) {
   const PiecePlaces places = find_places(ranks, parts, pieces);
@@ -115,7 +115,10 @@ MeshSize write_ply(Ranks& ranks, const PartPlans& parts, std::span<const OwnPiec
   const std::string text = ply_header(header, places.mesh);
   if (out) file->write_at(0, std::as_bytes(std::span(text)));
   PieceCopy copy(*file, header, places.mesh);
-  for (std::size_t i = 0; i < pieces.size(); ++i) copy.copy(pieces[i], places.own[i], progress);
+  for (std::size_t i = 0; i < pieces.size(); ++i) {
+    copy.copy(pieces[i], places.own[i], progress);
+    pieces[i].bytes.reset();  // and the memory that it takes
+  }
   file->close();
   if (out) out->publish();
   ranks.wait_for_all();

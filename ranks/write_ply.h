@@ -2,7 +2,7 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <span>
+#include <vector>
 
 #include <isobrick/mesh.h>
 #include <isobrick/progress.h>
@@ -12,9 +12,10 @@
 namespace isobrick::inline v0 {
 
 /// Collective: puts the pieces of a mesh together to the PLY that PlySink makes, byte for byte.
-/// Every rank writes its own pieces at their places. The file has its name once all have. Throws
-/// as find_places(), OutputFile and PieceReader do. Returns the mesh's size.
-MeshSize write_ply(Ranks& ranks, const PartPlans& parts, std::span<const OwnPiece> pieces,
+/// Every rank writes its own pieces at their places, and forgets each once it is written. The file
+/// has its name once all have. Throws as find_places(), OutputFile and PieceReader do. Returns the
+/// mesh's size.
+MeshSize write_ply(Ranks& ranks, const PartPlans& parts, std::vector<OwnPiece> pieces,
                    const MeshHeader& header, const std::filesystem::path& path, bool force,
                    Progress& progress);
 

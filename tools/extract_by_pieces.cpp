@@ -126,72 +126,114 @@ void put_sums(const PieceSums& sums, ExtractReport& r) {
   r.sink = sums.sink;
 }
 
-/// The pieces of a surface.
-struct MadePieces {
-  fs::path folder;
-  std::vector<fs::path> paths;  ///< of all parts
-  std::vector<OwnPiece> own;    ///< those that this rank made
-  std::size_t kept = 0;
-  ExtractReport report;
-};
-
-MadePieces make_pieces(const ExtractedSurface& surface, const PieceMaker& maker, Ranks* job,
-                       Console& console) {
-  const std::uint32_t parts = maker.parts().count();
-  MadePieces made;
-  made.folder = surface.output;
-  made.folder += ".pieces";
-  std::error_code failure;
-  fs::create_directory(made.folder, failure);
-  if (failure) throw system_error("create", made.folder.string(), failure.value());
-  for (std::uint32_t i = 1; i <= parts; ++i)
-    made.paths.push_back(made.folder / fmt::format("{}of{}{}", i, parts, kPieceExtension));
-  PieceSums sums;
-  const auto make = [&](std::uint64_t i) {
-    const auto number = static_cast<std::uint32_t>(i + 1);
-    const PieceReport piece = maker.make(number, made.paths[i], false, console.progress());
-    made.report.active_bricks = piece.surface.active_bricks;
-    made.report.index = piece.surface.index;
-    made.own.push_back({number, made.paths[i]});
-    add(sums_of(piece), sums);
-  };
-  if (job == nullptr) {
-    for (std::uint32_t i = 0; i < parts; ++i) make(i);
-  } else {
-    deal(*job, parts, make);
-    const auto all = job->gather(std::as_bytes(std::span(&sums, 1)));
-    sums = {};
-    for (const Ranks::Bytes& of_rank : all) add(to_items<PieceSums>(of_rank).front(), sums);
-  }
-  made.kept = sums.kept;
-  put_sums(sums, made.report);
-  made.report.degenerate_triangles = sums.degenerate;
-  return made;
-}
-
-/// The folder goes if nobody put anything else into it.
-void remove_pieces(const MadePieces& pieces) {
-  std::error_code ignored;
-  for (const auto& entry : fs::directory_iterator(pieces.folder, ignored))
-    if (entry.path().extension() == kPieceExtension) fs::remove(entry.path(), ignored);
-  fs::remove(pieces.folder, ignored);
-}
-
 /// Whether the ranks can write their pieces of the mesh as they are.
 bool is_written_by_all(const ExtractArguments& arguments, const ExtractedSurface& surface) {
   return surface.form.format == MeshFormat::ply && !surface.filter.any() &&
          arguments.attributes.empty();
 }
 
+/// Of a rank's budget, what pieces may take that wait for their places in the mesh.
+std::uint64_t spool_memory(const ExtractArguments& arguments) {
+  constexpr std::uint64_t enough_for_both = std::uint64_t{512} << 20;
+  return arguments.memory >= enough_for_both ? arguments.memory / 2 : 0;
+}
+
+/// The pieces of a surface.
+struct MadePieces {
+  fs::path folder;              ///< of `paths`; none where ranks write the mesh at once
+  std::vector<fs::path> paths;  ///< of all parts
+  std::vector<OwnPiece> own;    ///< those that this rank made
+  std::uint32_t total = 0;
+  std::uint64_t kept = 0;
+  ExtractReport report;
+};
+
+/// Makes the pieces of one surface, alone or with the other ranks.
+class PieceWork {
+ public:
+  PieceWork(const ExtractedSurface& surface, const PieceMaker& maker, Ranks* job, Console& console)
+      : surface_(surface), maker_(maker), job_(job), console_(console) {
+    made_.total = maker.parts().count();
+  }
+
+  /// In a folder beside the mesh, where those that are whole are kept.
+  MadePieces in_files() {
+    made_.folder = surface_.output;
+    made_.folder += ".pieces";
+    std::error_code failure;
+    fs::create_directory(made_.folder, failure);
+    if (failure) throw system_error("create", made_.folder.string(), failure.value());
+    for (std::uint32_t i = 1; i <= made_.total; ++i)
+      made_.paths.push_back(made_.folder /
+                            fmt::format("{}of{}{}", i, made_.total, kPieceExtension));
+    deal_out([&](std::uint32_t number) {
+      const fs::path& path = made_.paths[number - 1];
+      take(maker_.make(number, path, false, console_.progress()));
+      made_.own.push_back({number, open_piece_file(path)});
+    });
+    return std::move(made_);
+  }
+
+  /// In so many bytes of memory, and files without names where they do not suffice.
+  MadePieces in_memory(std::uint64_t memory) {
+    deal_out([&](std::uint32_t number) {
+      auto piece = std::make_shared<SpooledPiece>(
+          open_scratch_beside(surface_.output.string(), static_cast<std::size_t>(memory)));
+      take(maker_.append(number, piece->writer(), console_.progress()));
+      memory -= std::min(memory, piece->size());
+      made_.own.push_back({number, std::move(piece)});
+    });
+    return std::move(made_);
+  }
+
+ private:
+  template <class F>
+  void deal_out(F&& make) {
+    if (job_ == nullptr) {
+      for (std::uint32_t number = 1; number <= made_.total; ++number) make(number);
+    } else {
+      deal(*job_, made_.total, [&](std::uint64_t i) { make(static_cast<std::uint32_t>(i + 1)); });
+      const auto all = job_->gather(std::as_bytes(std::span(&sums_, 1)));
+      sums_ = {};
+      for (const Ranks::Bytes& of_rank : all) add(to_items<PieceSums>(of_rank).front(), sums_);
+    }
+    made_.kept = sums_.kept;
+    put_sums(sums_, made_.report);
+    made_.report.degenerate_triangles = sums_.degenerate;
+  }
+
+  void take(const PieceReport& piece) {
+    made_.report.active_bricks = piece.surface.active_bricks;
+    made_.report.index = piece.surface.index;
+    add(sums_of(piece), sums_);
+  }
+
+  const ExtractedSurface& surface_;
+  const PieceMaker& maker_;
+  Ranks* job_;
+  Console& console_;
+  PieceSums sums_;
+  MadePieces made_;
+};
+
+/// The folder goes if nobody put anything else into it.
+void remove_pieces(const MadePieces& pieces) {
+  if (pieces.folder.empty()) return;
+  std::error_code ignored;
+  for (const auto& entry : fs::directory_iterator(pieces.folder, ignored))
+    if (entry.path().extension() == kPieceExtension) fs::remove(entry.path(), ignored);
+  fs::remove(pieces.folder, ignored);
+}
+
 /// What became of the pieces of a surface.
 MergeResult put_together(const ExtractArguments& arguments, const ExtractedSurface& surface,
-                         const PieceMaker& maker, const MadePieces& pieces, Ranks* job,
+                         const PieceMaker& maker, MadePieces& pieces, Ranks* job,
                          Console& console) {
   MergeResult made;
   if (job != nullptr && is_written_by_all(arguments, surface)) {
     const Stopwatch watch(made.seconds);
-    made.size = write_ply(*job, maker.parts(), pieces.own, maker.header(), surface.output,
-                          arguments.force, console.progress());
+    made.size = write_ply(*job, maker.parts(), std::move(pieces.own), maker.header(),
+                          surface.output, arguments.force, console.progress());
     made.filtered.extracted = made.size;
     made.bytes = mesh_bytes(surface.output);
     if (made.size.triangles == 0)
@@ -235,7 +277,8 @@ CommandOutput make_by_pieces(const ExtractArguments& arguments,
                              const StoreReader& store, Ranks* job, Console& console) {
   check_piece_arguments(arguments, job);
   check_outputs_of(arguments, surfaces, store, job);
-  set_interrupt_note([] { return "the same command goes on with the pieces that are whole"; });
+  if (arguments.resume || job == nullptr)
+    set_interrupt_note([] { return "the same command goes on with the pieces that are whole"; });
   CommandOutput result;
   std::vector<ExtractReport> reports;
   std::vector<std::string> names;
@@ -245,8 +288,16 @@ CommandOutput make_by_pieces(const ExtractArguments& arguments,
     MadePieces pieces;
     {
       const Stopwatch watch(seconds);
-      const PieceMaker maker(store, surface.options, count_parts(store, surface.options, job));
-      pieces = make_pieces(surface, maker, job, console);
+      // Pieces of a mesh that all ranks write are kept for a later run only on request.
+      const bool spools =
+          job != nullptr && !arguments.resume && is_written_by_all(arguments, surface);
+      const std::uint64_t memory = spools ? spool_memory(arguments) : 0;
+      ExtractOptions options = surface.options;
+      options.memory -= memory;
+      options.memory_of_others += memory;
+      const PieceMaker maker(store, options, count_parts(store, options, job));
+      PieceWork work(surface, maker, job, console);
+      pieces = spools ? work.in_memory(memory) : work.in_files();
       made = put_together(arguments, surface, maker, pieces, job, console);
     }
     ExtractReport& report = pieces.report;
@@ -258,12 +309,11 @@ CommandOutput make_by_pieces(const ExtractArguments& arguments,
     report.seconds = seconds;
     report.pass = reports.size();
     ordered_json object = report_json(surface, report, made.filtered, made.bytes);
-    object["pieces"] = {{"total", pieces.paths.size()}, {"kept", pieces.kept}};
+    object["pieces"] = {{"total", pieces.total}, {"kept", pieces.kept}};
     result.objects.push_back(std::move(object));
     result.text += report_text(surface, report, made.filtered, made.bytes, true);
     if (pieces.kept > 0)
-      result.text +=
-          fmt::format("  went on with {} of {} pieces\n", pieces.kept, pieces.paths.size());
+      result.text += fmt::format("  went on with {} of {} pieces\n", pieces.kept, pieces.total);
     reports.push_back(report);
     names.push_back(surface.output.string());
   }

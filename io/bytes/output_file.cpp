@@ -133,6 +133,11 @@ void FileWriter::patch(std::uint64_t offset, std::string_view bytes) {
 }
 
 void FileWriter::read_back(std::uint64_t offset, std::span<std::byte> bytes) {
+  if (offset >= written_ && offset - written_ + bytes.size() <= used_) {
+    if (!bytes.empty())
+      std::memcpy(bytes.data(), buffer_.get() + (offset - written_), bytes.size());
+    return;
+  }
   flush();
   file_.read_at(offset, bytes);
 }

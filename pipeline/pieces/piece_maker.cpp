@@ -98,12 +98,14 @@ PieceMaker::PieceMaker(const StoreReader& store, const ExtractOptions& options, 
   mesh_ = mesh_json(store, request, options.level);
 }
 
+PieceDescription PieceMaker::describe(std::uint32_t number) const {
+  return {{number, plans_.count()}, plans_.tiles(number), mesh_, header_};
+}
+
 PieceReport PieceMaker::make(std::uint32_t number, const std::filesystem::path& path, bool force,
                              Progress& progress) const {
-  const TileRange tiles = plans_.tiles(number);
-  const PieceDescription header{{number, plans_.count()}, tiles, mesh_, header_};
-  PieceReport report;
-  if (const auto end = find_piece(path, to_text(header), force)) {
+  if (const auto end = find_piece(path, to_text(describe(number)), force)) {
+    PieceReport report;
     report.is_kept = true;
     report.surface.vertices = end->vertices;
     report.surface.triangles = end->triangles;
@@ -111,9 +113,18 @@ PieceReport PieceMaker::make(std::uint32_t number, const std::filesystem::path& 
     report.bytes = end->bytes;
     return report;
   }
-  PieceWriter writer(path, header, true);
-  report.surface = extract_part(store_, options_, {tiles, &writer, plans_.active_blocks(number)},
-                                writer, progress);
+  OutputFile out(path.string(), true);
+  const PieceReport report = append(number, out.writer(), progress);
+  out.publish();
+  return report;
+}
+
+PieceReport PieceMaker::append(std::uint32_t number, FileWriter& out, Progress& progress) const {
+  PieceReport report;
+  PieceWriter writer(out, describe(number));
+  report.surface =
+      extract_part(store_, options_, {plans_.tiles(number), &writer, plans_.active_blocks(number)},
+                   writer, progress);
   report.bytes = writer.end().bytes;
   return report;
 }

@@ -6,8 +6,10 @@
 #include <nlohmann/json.hpp>
 
 #include <isobrick/pieces.h>
+#include "io/bytes/output_file.h"
 #include "pipeline/extract/extract_plan.h"
 #include "pipeline/pieces/part_plan.h"
+#include "pipeline/pieces/piece_format.h"
 
 namespace isobrick::inline v0 {
 
@@ -23,8 +25,12 @@ class PieceMaker {
   /// Part `number`, from 1.
   PieceReport make(std::uint32_t number, const std::filesystem::path& path, bool force,
                    Progress& progress) const;
+  /// The same part, appended to `out`, which is empty.
+  PieceReport append(std::uint32_t number, FileWriter& out, Progress& progress) const;
 
  private:
+  PieceDescription describe(std::uint32_t number) const;
+
   const StoreReader& store_;
   ExtractOptions options_;
   PartPlans plans_;

@@ -17,23 +17,41 @@ constexpr std::uint32_t kMaxHeader = 1 << 20;
 /// Read at once by those who pass over tiles.
 constexpr std::uint64_t kSmallBuffer = 4096;
 
+class PieceFile final : public PieceBytes {
+ public:
+  explicit PieceFile(const std::filesystem::path& path) : file_(open_input(path)) {}
+  std::uint64_t size() const override { return file_.size(); }
+  void read_at(std::uint64_t offset, std::span<std::byte> bytes) override {
+    file_.read_at(offset, bytes);
+  }
+  std::string name() const override { return quoted(file_.path()); }
+
+ private:
+  File file_;
+};
+
 }  // namespace
 
-PieceReader::PieceReader(const std::filesystem::path& path) : file_(open_input(path)) {
-  const std::uint64_t size = file_.size();
+std::unique_ptr<PieceBytes> open_piece_file(const std::filesystem::path& path) {
+  return std::make_unique<PieceFile>(path);
+}
+
+PieceReader::PieceReader(std::shared_ptr<PieceBytes> piece) : piece_(std::move(piece)) {
+  const std::uint64_t size = piece_->size();
   PieceStart start;
-  if (size >= sizeof start) file_.read_at(0, std::as_writable_bytes(std::span(&start, 1)));
+  if (size >= sizeof start) piece_->read_at(0, std::as_writable_bytes(std::span(&start, 1)));
   if (size > 0 && (size < sizeof start || start.magic != PieceStart::kMagic))
     throw UsageError(fmt::format("{} is no piece of a mesh; 'isobrick extract --part' makes them",
-                                 quoted(path)));
+                                 piece_->name()));
   if (size > 0 && start.version != PieceStart::kVersion)
     throw UsageError(fmt::format("{} is a piece of version {}, and this isobrick knows version {}",
-                                 quoted(path), start.version, PieceStart::kVersion));
+                                 piece_->name(), start.version, PieceStart::kVersion));
   if (size < sizeof start + sizeof end_ || start.header_bytes > kMaxHeader ||
       size - sizeof start - sizeof end_ < start.header_bytes)
     fail("is cut off");
-  text_ = file_.text_at(sizeof start, start.header_bytes);
-  file_.read_at(size - sizeof end_, std::as_writable_bytes(std::span(&end_, 1)));
+  text_.resize(start.header_bytes);
+  piece_->read_at(sizeof start, std::as_writable_bytes(std::span(text_)));
+  piece_->read_at(size - sizeof end_, std::as_writable_bytes(std::span(&end_, 1)));
   const auto all = std::as_bytes(std::span(&end_, 1));
   if (end_.magic != PieceEnd::kMagic || end_.bytes != size ||
       end_.own_crc32c != crc32c(all.first(sizeof end_ - sizeof end_.own_crc32c)))
@@ -48,7 +66,7 @@ PieceReader::PieceReader(const std::filesystem::path& path) : file_(open_input(p
 void PieceReader::fail(const std::string& what) const {
   throw DamageError(
       fmt::format("{} {}: make it again with the 'isobrick extract --part' that made it",
-                  quoted(file_.path()), what));
+                  piece_->name(), what));
 }
 
 void PieceReader::read_bytes(std::span<std::byte> bytes) {
@@ -57,13 +75,13 @@ void PieceReader::read_bytes(std::span<std::byte> bytes) {
   while (!bytes.empty()) {
     if (begin_ == filled_) {
       if (bytes.size() >= kBuffer) {
-        file_.read_at(at_, bytes);
+        piece_->read_at(at_, bytes);
         at_ += bytes.size();
         break;
       }
       buffer_.resize(kBuffer);
       filled_ = std::min<std::uint64_t>(skips_ ? kSmallBuffer : kBuffer, left());
-      file_.read_at(at_, std::span(buffer_).first(filled_));
+      piece_->read_at(at_, std::span(buffer_).first(filled_));
       begin_ = 0;
     }
     const std::size_t count = std::min(bytes.size(), filled_ - begin_);

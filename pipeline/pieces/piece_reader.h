@@ -3,11 +3,12 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <span>
 #include <string>
 #include <vector>
 
-#include "io/bytes/file.h"
+#include "pipeline/pieces/piece_bytes.h"
 #include "pipeline/pieces/piece_format.h"
 
 namespace isobrick::inline v0 {
@@ -17,9 +18,12 @@ class PieceReader {
  public:
   static constexpr std::size_t kBuffer = std::size_t{256} << 10;
 
-  /// Reads header and end. Throws Error where there is no such file, UsageError where it is no
-  /// piece of a version that this program knows, DamageError for one that shows damage.
-  explicit PieceReader(const std::filesystem::path& path);
+  /// Reads header and end. Throws UsageError where there is no piece of a version that this program
+  /// knows, DamageError for one that shows damage.
+  explicit PieceReader(std::shared_ptr<PieceBytes> piece);
+  /// The same of a file. Throws Error where there is none.
+  explicit PieceReader(const std::filesystem::path& path)
+      : PieceReader(std::shared_ptr<PieceBytes>(open_piece_file(path))) {}
 
   const PieceDescription& header() const { return header_; }
   const std::string& header_text() const { return text_; }
@@ -47,7 +51,7 @@ class PieceReader {
   void read_bytes(std::span<std::byte> bytes);
   std::uint64_t left() const { return end_.bytes - sizeof end_ - at_; }
 
-  File file_;
+  std::shared_ptr<PieceBytes> piece_;
   std::string text_;
   PieceDescription header_;
   PieceEnd end_;

@@ -9,9 +9,8 @@
 
 namespace isobrick::inline v0 {
 
-PieceWriter::PieceWriter(const std::filesystem::path& path, const PieceDescription& header,
-                         bool force)
-    : out_(path.string(), force),
+PieceWriter::PieceWriter(FileWriter& out, const PieceDescription& header)
+    : out_(out),
       tiles_(header.tiles),
       extent_(header.extent()),
       has_normals_(header.of_mesh.has_normals) {
@@ -25,7 +24,7 @@ template <class T>
 void PieceWriter::append(std::span<const T> items) {
   const auto bytes = std::as_bytes(items);
   end_.content_crc32c = crc32c(bytes, end_.content_crc32c);
-  out_.writer().append(bytes);
+  out_.append(bytes);
 }
 
 void PieceWriter::place(const TilePlace& tile) {
@@ -86,8 +85,7 @@ void PieceWriter::finish() {
   end_.bytes = bytes() + sizeof end_;
   const auto all = std::as_bytes(std::span(&end_, 1));
   end_.own_crc32c = crc32c(all.first(sizeof end_ - sizeof end_.own_crc32c));
-  out_.writer().append(all);
-  out_.publish();
+  out_.append(all);
 }
 
 std::uint64_t PieceWriter::memory() const {

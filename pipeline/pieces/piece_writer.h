@@ -2,7 +2,6 @@
 
 #include <cstdint>
 #include <deque>
-#include <filesystem>
 #include <mutex>
 #include <optional>
 #include <span>
@@ -19,8 +18,8 @@ namespace isobrick::inline v0 {
 /// neither the chunks nor who makes them.
 class PieceWriter final : public MeshSink, public TilePlaces {
  public:
-  /// The file has its name once it is finished; what was there before is replaced with `force`.
-  PieceWriter(const std::filesystem::path& path, const PieceDescription& header, bool force);
+  /// Appends to `out`, which must outlive it.
+  PieceWriter(FileWriter& out, const PieceDescription& header);
 
   void place(const TilePlace& tile) override;
 
@@ -28,7 +27,7 @@ class PieceWriter final : public MeshSink, public TilePlaces {
   void begin(const MeshHeader&) override {}
   void write(const MeshChunk& chunk) override;
   void finish() override;
-  std::uint64_t bytes() const override { return out_.writer().size(); }
+  std::uint64_t bytes() const override { return out_.size(); }
   /// The tiles before the part wait for its first.
   std::uint64_t memory() const override;
 
@@ -41,7 +40,7 @@ class PieceWriter final : public MeshSink, public TilePlaces {
   void write_neighbours();
   std::optional<TilePlace> take_place();
 
-  OutputFile out_;
+  FileWriter& out_;
   TileRange tiles_;
   Int3 extent_;
   bool has_normals_;

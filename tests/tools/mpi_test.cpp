@@ -186,7 +186,7 @@ TEST_F(Mpi, AKilledRankEndsTheJobAndThePiecesAreKept) {
   std::uint64_t kept = 0;
   for (const int at : {1, 3, 5}) {
     Arguments words = launch(1);
-    const Arguments arguments = extract("m.ply");
+    const Arguments arguments = extract("m.ply", {"--resume"});
     words.insert(words.end(), arguments.begin(), arguments.end());
     const Arguments other{":",
                           "-n",
@@ -208,7 +208,7 @@ TEST_F(Mpi, AKilledRankEndsTheJobAndThePiecesAreKept) {
       EXPECT_TRUE(read_file(path("m.ply")) == read_file(path("one.ply")));
       fs::remove(path("m.ply"));
     }
-    const auto made = mpirun_json(2, extract("m.ply"));
+    const auto made = mpirun_json(2, extract("m.ply", {"--resume"}));
     kept += made["surfaces"][0]["pieces"]["kept"].get<std::uint64_t>();
     EXPECT_TRUE(read_file(path("m.ply")) == read_file(path("one.ply")));
     EXPECT_EQ(files(), (std::vector<std::string>{"g.zarr", "m.ply", "one.ply"})) << at;
