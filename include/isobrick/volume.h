@@ -28,7 +28,9 @@ struct Volume {
   Int3 mask_strides = {};              ///< of the mask, as `strides`
   /// In place of `samples`: copies those of a box, which lies in the extent, to `out`, C order
   /// [z, y, x] without gaps. Called from one thread at a time, which need not be the caller's, or
-  /// from several where `concurrent_reads` is set. What it throws ends the operation.
+  /// from several where `concurrent_reads` is set. What it throws ends the operation. With a region
+  /// it is asked for whole boxes; what it gives beyond the region and a layer around it, two with
+  /// normals, does not show in that surface.
   std::function<void(Box3 box, void* out)> read = {};
   bool concurrent_reads = false;  ///< whether several threads may call `read` at a time
 

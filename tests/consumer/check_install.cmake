@@ -26,6 +26,20 @@ foreach(program array simulation cancel)
   run(${WORK}/build/${program})
 endforeach()
 
+# The ranks of a simulation, as many as they are, have one surface.
+find_program(mpirun mpirun)
+if(mpirun AND EXISTS ${WORK}/build/in_situ)
+  foreach(ranks 1 3)
+    execute_process(COMMAND ${CMAKE_COMMAND} -E env OMPI_ALLOW_RUN_AS_ROOT=1
+      OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 OMPI_MCA_rmaps_base_oversubscribe=1
+      ${mpirun} -n ${ranks} ${WORK}/build/in_situ WORKING_DIRECTORY ${WORK}
+      OUTPUT_VARIABLE of_${ranks} COMMAND_ERROR_IS_FATAL ANY)
+  endforeach()
+  if(NOT of_1 STREQUAL of_3 OR NOT of_1 MATCHES "step 20: [1-9][0-9]* triangles")
+    message(FATAL_ERROR "ranks made another surface than one process:\n${of_1}${of_3}")
+  endif()
+endif()
+
 # The program that uses CUDA itself, run where there is a device.
 if(CUDA)
   run(${CMAKE_COMMAND} -DDEVICE=ON -DCMAKE_DISABLE_FIND_PACKAGE_CUDAToolkit=OFF ${WORK}/build)
