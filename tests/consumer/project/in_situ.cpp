@@ -83,7 +83,8 @@ int main(int argc, char** argv) {
     simulation.step();
     if (step % 10 != 0) continue;
     const isobrick::Mesh mesh = simulation.surface(0.1);
-    mesh.save("heat_" + std::to_string(step) + "_" + std::to_string(simulation.rank) + ".vtp");
+    mesh.save("heat_" + std::to_string(step) + "_" + std::to_string(simulation.rank) + ".vtp",
+              {.force = true});
     unsigned long long own = mesh.triangles.size(), all = 0;
     MPI_Reduce(&own, &all, 1, MPI_UNSIGNED_LONG_LONG, MPI_SUM, 0, MPI_COMM_WORLD);
     if (simulation.rank == 0) std::printf("step %d: %llu triangles\n", step, all);
