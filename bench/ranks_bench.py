@@ -1,3 +1,4 @@
+#!/usr/bin/env python3
 """Strong and weak scaling of the ranks of mpirun, beside the threads of one process.
 
 ranks_bench.py ISOBRICK FOLDER [--ranks 1,2,4,8] [--edge 1024] [--weak-edge 512] [--turns 3]
