@@ -132,7 +132,8 @@ std::string text_of(const fs::path& path) {
 // What the guide shows is compiled and run against an installation.
 TEST(Documents, ProgramsOfTheGuideAreThoseThatAreTested) {
   const std::string guide = text_of(sources() / "docs/guide/cpp.md");
-  for (const char* name : {"store", "array", "simulation", "in_situ", "device", "device_store", "cancel"}) {
+  for (const char* name :
+       {"store", "array", "simulation", "in_situ", "device", "device_store", "cancel"}) {
     const std::string program =
         text_of(sources() / "tests/consumer/project" / (std::string(name) + ".cpp"));
     const auto begin = program.find("#include");
