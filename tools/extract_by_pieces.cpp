@@ -177,7 +177,7 @@ class PieceWork {
   /// In so many bytes of memory, and files without names where they do not suffice.
   MadePieces in_memory(std::uint64_t memory) {
     deal_out([&](std::uint32_t number) {
-      auto piece = std::make_shared<SpooledPiece>(
+      auto piece = std::make_shared<BufferedPiece>(
           open_scratch_beside(surface_.output.string(), static_cast<std::size_t>(memory)));
       take(maker_.append(number, piece->writer(), console_.progress()));
       memory -= std::min(memory, piece->size());

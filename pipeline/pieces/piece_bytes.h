@@ -25,9 +25,9 @@ class PieceBytes {
 std::unique_ptr<PieceBytes> open_piece_file(const std::filesystem::path& path);
 
 /// A piece that no other process needs. What its writer holds in memory stays there.
-class SpooledPiece final : public PieceBytes {
+class BufferedPiece final : public PieceBytes {
  public:
-  explicit SpooledPiece(FileWriter writer) : writer_(std::move(writer)) {}
+  explicit BufferedPiece(FileWriter writer) : writer_(std::move(writer)) {}
   FileWriter& writer() { return writer_; }
 
   std::uint64_t size() const override { return writer_.size(); }

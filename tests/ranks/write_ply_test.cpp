@@ -33,7 +33,7 @@ class WritePly : public Pieces {
     deal(ranks, maker.parts().count(), [&](std::uint64_t i) {
       const auto number = static_cast<std::uint32_t>(i + 1);
       if (in_memory) {  // and part of it in a file without a name
-        auto piece = std::make_shared<SpooledPiece>(
+        auto piece = std::make_shared<BufferedPiece>(
             open_scratch_beside((folder_ / "scratch").string(), i % 2 << 22));
         maker.append(number, piece->writer(), no_progress());
         own.push_back({number, std::move(piece)});
