@@ -161,7 +161,8 @@ StoreFacts gather(const StoreReader& store, const InfoArguments& arguments, Prog
   facts.indexes = indexes_of(store, stats);
   facts.label_images = label_image_names(*store.storage());
   if (stats) {
-    facts.bytes = bytes_of(store.storage()->local_path());
+    if (const fs::path place = store.storage()->local_path(); !place.empty())
+      facts.bytes = bytes_of(place);  // behind a URL nobody counts them
     for (std::size_t i = 0; i < facts.stored.size(); ++i)
       facts.stored[i] = stored_bricks(store, static_cast<int>(i));
   }
@@ -290,6 +291,9 @@ std::string codec_text(const StoreInfo& info, const StoreFacts& facts) {
 }
 
 std::string bytes_text(const StoreFacts& facts) {
+  if (!facts.bytes && facts.stats)
+    return fmt::format("bytes        unknown behind a URL, for {} of samples\n",
+                       human_bytes(facts.raw_bytes));
   if (!facts.bytes)
     return fmt::format("bytes        with --stats, for {} of samples\n",
                        human_bytes(facts.raw_bytes));
@@ -345,8 +349,9 @@ int run_info(const InfoArguments& arguments, Console& console) {
   check_input(input.path);
   if (is_zarr(input.path)) {
     // Whatever it lacks: nothing is converted.
-    if (!list_volumes(input.path, input.volume.selection, console))
-      report(open_store(input.path, input.volume.selection), arguments, console);
+    const auto storage = open_input_storage(input, console);
+    if (!list_volumes(input.path, *storage, input.volume.selection, console))
+      report(StoreReader(storage, input.volume.selection), arguments, console);
   } else if (!arguments.stats) {
     report_source(input, console);
   } else {

@@ -98,8 +98,9 @@ std::string text_of(const std::filesystem::path& path, const MetadataFiles& file
 
 }  // namespace
 
-bool list_volumes(const std::filesystem::path& path, const Selection& selection, Console& console) {
-  const MetadataFiles files = read_metadata_files(*open_storage(path));
+bool list_volumes(const std::filesystem::path& path, const Storage& storage,
+                  const Selection& selection, Console& console) {
+  const MetadataFiles files = read_metadata_files(storage);
   const std::vector<VolumeAxis> axes =
       open_axes(files.image, files.levels.front().array, selection);
   if (axes.empty()) return false;

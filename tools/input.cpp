@@ -13,6 +13,11 @@ std::filesystem::path parse_cache(const std::string& text) {
   return text == "none" ? std::filesystem::path() : std::filesystem::path(text);
 }
 
+/// "none" or a number of bytes.
+std::uint64_t parse_remote_cache(const std::string& text) {
+  return text == "none" ? 0 : parse_bytes(text);
+}
+
 }  // namespace
 
 void add_volume_options(CLI::App* app, VolumeRequest& volume) {
@@ -57,6 +62,17 @@ void add_input(CLI::App* app, InputArguments& input, bool required) {
               "~/.cache/isobrick"});
   add_parsed(app, input.cache.limit, parse_bytes,
              {"--cache-limit", "BYTES", "Bytes of all stores that are kept", "20G"});
+  add_parsed(app, input.cache.remote_limit, parse_remote_cache,
+             {"--remote-cache", "BYTES|none",
+              "Bytes of stores behind URLs that are kept in the folder of --cache", "none"});
+}
+
+std::shared_ptr<const Storage> open_input_storage(const InputArguments& input, Console& console) {
+  RemoteOptions options;
+  options.cache_folder = input.cache.folder;
+  options.cache_limit = input.cache.remote_limit;
+  options.on_note = [&console](const std::string& note) { console.note(note); };
+  return open_storage(input.path, options);
 }
 
 OpenedVolume open_input(const InputArguments& input, std::uint64_t memory, int threads,

@@ -1,9 +1,11 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <string>
 
 #include <isobrick/open_volume.h>
+#include <isobrick/storage.h>
 #include "tools/options.h"
 
 namespace isobrick::tools {
@@ -20,6 +22,10 @@ void add_input(CLI::App* app, InputArguments& input, bool required = true);
 /// The options of it alone: those of raw samples, of the place in the world, and of the choice
 /// among several volumes.
 void add_volume_options(CLI::App* app, VolumeRequest& volume);
+
+/// Opens the storage of an input that is a store or Zarr, with the cache for remote ones. `console`
+/// must live as long as the storage.
+std::shared_ptr<const Storage> open_input_storage(const InputArguments& input, Console& console);
 
 /// Opens the input as a store, by way of the cache where it is none, and writes what it notes.
 /// `downsampling` is that of a conversion.

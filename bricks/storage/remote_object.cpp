@@ -83,6 +83,7 @@ void RangeFetcher::schedule() {
 
 void RangeFetcher::hint(const std::shared_ptr<const RemoteObject>& object, ByteRange range) {
   if (range.size == 0 || range.size > max_bytes_) return;
+  if (object->cached() != nullptr && object->cached()->has(range.offset, range.size)) return;
   const std::lock_guard lock(mutex_);
   const FetchPtr there = find(object.get(), range.offset);
   if (there && range.end() <= there->range.end()) return;
@@ -191,6 +192,14 @@ std::size_t RangeFetcher::read_kept(const RemoteObject& object, std::uint64_t of
   }
   if (!fetch) return 0;
   changed_.wait(lock, [&] { return fetch->state == State::done || fetch->state == State::failed; });
+  // Kept on the disk by the first who reads it: no bytes wait for the disk, and the network goes
+  // on.
+  if (object.cached() != nullptr && fetch->state == State::done &&
+      !std::exchange(fetch->is_cached, true)) {
+    lock.unlock();
+    object.cached()->write(fetch->range.offset, fetch->bytes);
+    lock.lock();
+  }
   const std::uint64_t begin = offset - fetch->range.offset;
   const std::uint64_t count = std::min<std::uint64_t>(out.size(), fetch->range.size - begin);
   const bool is_done = fetch->state == State::done;
@@ -203,19 +212,29 @@ std::size_t RangeFetcher::read_kept(const RemoteObject& object, std::uint64_t of
   return is_done ? static_cast<std::size_t>(count) : 0;
 }
 
+/// The same of bytes that the disk has, else of a request that is sent now. Never 0.
+std::size_t RangeFetcher::read_now(const RemoteObject& object, std::uint64_t offset,
+                                   std::span<std::byte> out) {
+  const CachedObject* const cached = object.cached();
+  std::uint64_t size = std::min<std::uint64_t>(kMaxRequest, out.size());
+  if (cached != nullptr) {
+    if (const std::size_t count = cached->read(offset, out)) return count;
+    size = cached->missing(offset, size);
+  }
+  const ByteRange part{offset, size};
+  const std::vector<std::byte> bytes = object.bytes_of(fetch(*client_, object.request(part)), part);
+  if (cached != nullptr) cached->write(offset, bytes);
+  std::copy(bytes.begin(), bytes.end(), out.begin());
+  return bytes.size();
+}
+
 void RangeFetcher::read(const std::shared_ptr<const RemoteObject>& object, std::uint64_t offset,
                         std::span<std::byte> out) {
   // The requests of a large range are sent side by side.
   if (out.size() > kMaxRequest) object->will_need(offset, out.size());
   while (!out.empty()) {
     std::size_t count = read_kept(*object, offset, out);
-    if (count == 0) {
-      const ByteRange part{offset, std::min<std::uint64_t>(kMaxRequest, out.size())};
-      const std::vector<std::byte> bytes =
-          object->bytes_of(fetch(*client_, object->request(part)), part);
-      std::copy(bytes.begin(), bytes.end(), out.begin());
-      count = bytes.size();
-    }
+    if (count == 0) count = read_now(*object, offset, out);
     offset += count;
     out = out.subspan(count);
   }
@@ -239,7 +258,7 @@ void RemoteObject::read(std::uint64_t offset, std::span<std::byte> bytes) const 
 }
 
 void RemoteObject::will_need(std::uint64_t offset, std::uint64_t size) const {
-  if (offset > size_ || size > size_ - offset) return;
+  if (offset > state_.size || size > state_.size - offset) return;
   // A large range in requests that are sent side by side.
   for (std::uint64_t at = 0; at < size; at += kMaxRequest)
     fetcher_->hint(shared_from_this(), {offset + at, std::min(kMaxRequest, size - at)});
@@ -248,22 +267,37 @@ void RemoteObject::will_need(std::uint64_t offset, std::uint64_t size) const {
 HttpRequest RemoteObject::request(ByteRange range) const {
   HttpRequest request{.url = url_, .range = range, .max_body = range.size};
   // A weak tag is no proof of equal bytes.
-  if (!etag_.empty() && !etag_.starts_with("W/")) request.headers.push_back("If-Match: " + etag_);
+  if (!state_.etag.empty() && !state_.etag.starts_with("W/"))
+    request.headers.push_back("If-Match: " + state_.etag);
   return request;
+}
+
+/// Whether a reply names another state than that of the bytes on the disk.
+bool RemoteObject::is_of_another_state(const HttpReply& reply) const {
+  const auto differs = [&](const char* header, const std::string& known) {
+    const std::string& value = reply.header(header);
+    return !value.empty() && !known.empty() && value != known;
+  };
+  return cached_ != nullptr &&
+         (differs("etag", state_.etag) || differs("last-modified", state_.last_modified));
 }
 
 std::vector<std::byte> RemoteObject::bytes_of(HttpReply reply, ByteRange range) const {
   const auto fail = [&](const std::string& why) {
     throw Error(fmt::format("'{}': bytes {} to {}: {}", name_, range.offset, range.end(), why));
   };
-  const bool is_whole = reply.status == 200 && range.offset == 0 && range.size == size_;
-  if (reply.status == 412 || reply.status == 404 || reply.status == 410)
+  const bool is_whole = reply.status == 200 && range.offset == 0 && range.size == state_.size;
+  if (reply.status == 412 || reply.status == 404 || reply.status == 410 ||
+      is_of_another_state(reply)) {
+    if (cached_ != nullptr) cached_->forget();
     fail("the object was changed or removed since it was opened; open the store anew");
+  }
   if (reply.status == 200 && !is_whole)
     fail("the server does not answer requests for ranges of bytes");
   if (reply.status != 206 && !is_whole) fail("the server answers " + status_text(reply.status));
   const std::string& content = reply.header("content-range");
-  const std::string expected = fmt::format("bytes {}-{}/{}", range.offset, range.end() - 1, size_);
+  const std::string expected =
+      fmt::format("bytes {}-{}/{}", range.offset, range.end() - 1, state_.size);
   if (reply.status == 206 && content != expected && !content.ends_with("/*"))
     fail(fmt::format("the server sent '{}' in place of '{}'", content, expected));
   if (reply.body.size() != range.size)

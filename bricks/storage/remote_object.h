@@ -14,6 +14,7 @@
 #include <vector>
 
 #include <isobrick/storage.h>
+#include "bricks/storage/cached_object.h"
 #include "io/http/http_client.h"
 
 namespace isobrick::inline v0 {
@@ -51,6 +52,7 @@ class RangeFetcher : public std::enable_shared_from_this<RangeFetcher> {
     ByteRange range;
     State state = State::pending;
     bool is_spare = false;         ///< nobody asked for it
+    bool is_cached = false;        ///< whether a thread has begun to keep it on the disk
     std::uint64_t unread = 0;      ///< bytes that were asked for and not read yet
     Clock::time_point done_at{};   ///< when it was done
     std::vector<std::byte> bytes;  ///< once it is done
@@ -68,6 +70,7 @@ class RangeFetcher : public std::enable_shared_from_this<RangeFetcher> {
   void send_pending();
   void send(const FetchPtr& fetch);
   std::size_t read_kept(const RemoteObject& object, std::uint64_t offset, std::span<std::byte> out);
+  std::size_t read_now(const RemoteObject& object, std::uint64_t offset, std::span<std::byte> out);
 
   std::shared_ptr<HttpClient> client_;
   std::uint64_t max_bytes_;
@@ -83,18 +86,18 @@ class RangeFetcher : public std::enable_shared_from_this<RangeFetcher> {
 /// An object that a URL names.
 class RemoteObject final : public StoredObject, public std::enable_shared_from_this<RemoteObject> {
  public:
-  /// `etag`: what the server calls this state of the object, or "".
+  /// `cached`: its bytes on the disk; null: none are kept there.
   RemoteObject(std::shared_ptr<RangeFetcher> fetcher, std::string name, std::string url,
-               std::uint64_t size, std::string etag)
+               ObjectState state, std::unique_ptr<const CachedObject> cached)
       : fetcher_(std::move(fetcher)),
         name_(std::move(name)),
         url_(std::move(url)),
-        etag_(std::move(etag)),
-        size_(size) {}
+        state_(std::move(state)),
+        cached_(std::move(cached)) {}
   ~RemoteObject() override { fetcher_->forget(*this); }
 
   std::string name() const override { return name_; }
-  std::uint64_t size() const override { return size_; }
+  std::uint64_t size() const override { return state_.size; }
   void read(std::uint64_t offset, std::span<std::byte> bytes) const override;
   void will_need(std::uint64_t offset, std::uint64_t size) const override;
 
@@ -103,10 +106,17 @@ class RemoteObject final : public StoredObject, public std::enable_shared_from_t
   /// The bytes of a reply to it. Throws Error where it is another answer or another state.
   std::vector<std::byte> bytes_of(HttpReply reply, ByteRange range) const;
 
+  const ObjectState& state() const { return state_; }
+  /// Its bytes on the disk; null: none are kept there.
+  const CachedObject* cached() const { return cached_.get(); }
+
  private:
+  bool is_of_another_state(const HttpReply& reply) const;
+
   std::shared_ptr<RangeFetcher> fetcher_;
-  std::string name_, url_, etag_;
-  std::uint64_t size_;
+  std::string name_, url_;
+  ObjectState state_;
+  std::unique_ptr<const CachedObject> cached_;
 };
 
 }  // namespace isobrick

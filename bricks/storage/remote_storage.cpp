@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <atomic>
 #include <charconv>
+#include <chrono>
 #include <deque>
 #include <future>
 #include <mutex>
@@ -15,6 +16,7 @@
 #include "bricks/storage/remote_object.h"
 #include "bricks/storage/remote_url.h"
 #include "bricks/storage/storage_keys.h"
+#include "core/text_hash.h"
 
 namespace isobrick::inline v0 {
 namespace {
@@ -35,6 +37,41 @@ std::optional<std::uint64_t> total_size(const std::string& content_range) {
   return size;
 }
 
+/// Without a word of the server, an object is not asked for again so soon.
+constexpr std::int64_t kFreshSeconds = 600;
+
+std::int64_t unix_seconds() {
+  return std::chrono::duration_cast<std::chrono::seconds>(
+             std::chrono::system_clock::now().time_since_epoch())
+      .count();
+}
+
+/// For how long a reply may be taken for the present state; nullopt: it must not be kept.
+std::optional<std::int64_t> seconds_fresh(const std::string& cache_control) {
+  if (cache_control.find("no-store") != cache_control.npos) return std::nullopt;
+  if (cache_control.find("no-cache") != cache_control.npos) return 0;
+  constexpr std::string_view name = "max-age=";
+  const std::size_t at = cache_control.find(name);
+  std::uint32_t seconds = 0;
+  if (at == cache_control.npos) return kFreshSeconds;
+  const char* const begin = cache_control.data() + at + name.size();
+  const auto parsed = std::from_chars(begin, cache_control.data() + cache_control.size(), seconds);
+  return parsed.ec == std::errc() ? seconds : 0;
+}
+
+/// Lets the server answer 304 where the object is still in this state.
+void ask_for_change(HttpRequest& request, const ObjectState& state) {
+  if (!state.etag.empty())
+    request.headers.push_back("If-None-Match: " + state.etag);
+  else if (!state.last_modified.empty())
+    request.headers.push_back("If-Modified-Since: " + state.last_modified);
+}
+
+/// Metadata of the root, which tell whether a store was written anew.
+bool is_root_file(const std::string& key) {
+  return std::ranges::find(kZarrFiles, key) != kZarrFiles.end();
+}
+
 std::string xml_decoded(std::string text) {
   for (const auto& [entity, character] :
        {std::pair("&lt;", "<"), std::pair("&gt;", ">"), std::pair("&quot;", "\""),
@@ -49,7 +86,11 @@ class RemoteStorage final : public Storage, public std::enable_shared_from_this<
   RemoteStorage(RemotePlace place, const RemoteOptions& options, std::shared_ptr<HttpClient> client)
       : place_(std::move(place)),
         client_(std::move(client)),
-        fetcher_(std::make_shared<RangeFetcher>(client_, options.memory)) {}
+        fetcher_(std::make_shared<RangeFetcher>(client_, options.memory)) {
+    if (!options.cache_folder.empty() && options.cache_limit > 0)
+      cache_ =
+          std::make_shared<RangeCache>(options.cache_folder, options.cache_limit, options.on_note);
+  }
 
   std::string name() const override { return place_.name; }
   std::string name_of(const std::string& key) const override { return place_.name + '/' + key; }
@@ -57,7 +98,9 @@ class RemoteStorage final : public Storage, public std::enable_shared_from_this<
   std::shared_ptr<const StoredObject> open(const std::string& key) const override {
     const Opened opened = begin_open(key);
     try {
-      return opened.get();
+      const auto object = opened.object.get();
+      note_state(key, *opened.reply);
+      return object;
     } catch (const Error&) {
       // The next call tries again.
       const std::lock_guard lock(mutex_);
@@ -95,9 +138,22 @@ class RemoteStorage final : public Storage, public std::enable_shared_from_this<
   /// Whether the server refused to show an object, which then seems to be missing.
   bool was_refused() const { return was_refused_; }
 
+  /// The object of this key tells whether the store was written anew: as long as it does not, the
+  /// cache need not ask for each object again.
+  void set_root(const std::string& key) const {
+    const Object object = cache_ ? begin_open(key).object.get() : nullptr;
+    if (object && object->state().is_known())
+      root_ = text_hash(url_of(key) + '\n' + std::to_string(object->state().hash()));
+  }
+
  private:
   using Object = std::shared_ptr<const RemoteObject>;
-  using Opened = std::shared_future<Object>;
+  /// What a reply says of an object, until the cache has it.
+  using Reply = std::optional<CachedState>;
+  struct Opened {
+    std::shared_future<Object> object;
+    std::shared_ptr<Reply> reply;  ///< valid when the object is there
+  };
 
   std::string url_of(const std::string& key) const {
     return place_.base + '/' + percent_encode(key, true) + place_.query;
@@ -105,7 +161,7 @@ class RemoteStorage final : public Storage, public std::enable_shared_from_this<
 
   Opened begin_open(const std::string& key) const {
     const auto promise = std::make_shared<std::promise<Object>>();
-    const Opened opened = promise->get_future().share();
+    const Opened opened{promise->get_future().share(), std::make_shared<Reply>()};
     {
       const std::lock_guard lock(mutex_);
       const auto [found, is_new] = opened_.try_emplace(key, opened);
@@ -117,12 +173,19 @@ class RemoteStorage final : public Storage, public std::enable_shared_from_this<
       }
     }
     HttpRequest request{.url = url_of(key), .range = ByteRange{0, kHead}, .max_body = kHead};
-    client_->send(std::move(request), [weak = weak_from_this(), promise, key](
+    const Reply known = known_state(key);
+    if (known && is_fresh(*known)) {
+      promise->set_value(known->is_missing ? nullptr : make_object(key, known->state));
+      return opened;
+    }
+    if (known) ask_for_change(request, known->state);
+    client_->send(std::move(request), [weak = weak_from_this(), promise, key, known, opened](
                                           HttpReply reply, const std::exception_ptr& error) {
       const auto self = weak.lock();
       try {
         if (error) std::rethrow_exception(error);
-        promise->set_value(self ? self->object_of(key, std::move(reply)) : nullptr);
+        promise->set_value(self ? self->object_of(key, known, std::move(reply), *opened.reply)
+                                : nullptr);
       } catch (const Error&) {
         promise->set_exception(std::current_exception());
       }
@@ -130,12 +193,52 @@ class RemoteStorage final : public Storage, public std::enable_shared_from_this<
     return opened;
   }
 
-  /// The object of a reply with its first bytes; null where there is none.
-  Object object_of(const std::string& key, HttpReply&& reply) const {
+  /// What the cache knows of an object; nothing of files of the root, which are always read.
+  Reply known_state(const std::string& key) const {
+    if (!cache_ || is_root_file(key)) return std::nullopt;
+    return cache_->find(cache_->folder_of(url_of(key)));
+  }
+
+  bool is_fresh(const CachedState& known) const {
+    return root_ != 0 && known.root == root_ && known.fresh_until > unix_seconds();
+  }
+
+  /// Hands what a reply says to the cache, on the caller's thread: the client's goes on.
+  void note_state(const std::string& key, Reply& reply) const {
+    Reply taken;
+    {
+      const std::lock_guard lock(mutex_);
+      taken = std::exchange(reply, std::nullopt);
+    }
+    if (taken && cache_ && !is_root_file(key)) cache_->put(cache_->folder_of(url_of(key)), *taken);
+  }
+
+  Object make_object(const std::string& key, const ObjectState& state,
+                     bool may_be_kept = true) const {
+    std::unique_ptr<const CachedObject> cached;
+    if (cache_ && may_be_kept && state.is_known())
+      cached = std::make_unique<const CachedObject>(cache_, url_of(key), state);
+    return std::make_shared<const RemoteObject>(fetcher_, name_of(key), url_of(key), state,
+                                                std::move(cached));
+  }
+
+  /// The object of a reply with its first bytes; null where there is none. `to_note`: what the
+  /// cache is to know of it.
+  Object object_of(const std::string& key, const Reply& known, HttpReply&& reply,
+                   Reply& to_note) const {
     const std::string name = name_of(key);
     const int status = reply.status;
+    const auto fresh_for = seconds_fresh(reply.header("cache-control"));
+    CachedState now{.fresh_until = unix_seconds() + fresh_for.value_or(0), .root = root_};
     if (status == 403) was_refused_ = true;
-    if (status == 403 || status == 404 || status == 410) return nullptr;
+    now.is_missing = status == 404 || status == 410;
+    if (now.is_missing && fresh_for) to_note = now;
+    if (status == 403 || now.is_missing) return nullptr;
+    if (status == 304 && known && !known->is_missing) {
+      now.state = known->state;
+      if (fresh_for) to_note = now;
+      return make_object(key, now.state);
+    }
     if (status == 301 && !reply.header("x-amz-bucket-region").empty())
       throw Error(fmt::format("'{}' is in another region: set AWS_REGION={}", place_.name,
                               reply.header("x-amz-bucket-region")));
@@ -148,8 +251,9 @@ class RemoteStorage final : public Storage, public std::enable_shared_from_this<
       throw Error(fmt::format("cannot read '{}': {}", name, status_text(status)));
     if (!size)
       throw Error(fmt::format("cannot read '{}': the server does not tell its size", name));
-    auto object = std::make_shared<const RemoteObject>(fetcher_, name, url_of(key), *size,
-                                                       reply.header("etag"));
+    now.state = {*size, reply.header("etag"), reply.header("last-modified")};
+    auto object = make_object(key, now.state, fresh_for.has_value());
+    if (fresh_for && now.state.is_known()) to_note = now;
     if (status == 416) reply.body.clear();
     fetcher_->keep(object, std::move(reply.body));
     return object;
@@ -158,6 +262,8 @@ class RemoteStorage final : public Storage, public std::enable_shared_from_this<
   RemotePlace place_;
   std::shared_ptr<HttpClient> client_;
   std::shared_ptr<RangeFetcher> fetcher_;
+  std::shared_ptr<RangeCache> cache_;            ///< null: nothing is kept on the disk
+  mutable std::atomic<std::uint64_t> root_ = 0;  ///< 0: not known
   mutable std::mutex mutex_;
   mutable std::unordered_map<std::string, Opened> opened_;
   mutable std::deque<std::string> keys_;  ///< of `opened_`, oldest first
@@ -246,7 +352,11 @@ std::shared_ptr<const Storage> open_remote_storage(const std::string& url,
   const auto storage = make_storage(url, options);
   for (const char* key : kZarrFiles) storage->will_open(key);
   const auto is_there = [&](const char* key) { return storage->open(key) != nullptr; };
-  if (std::ranges::any_of(kZarrFiles, is_there)) return storage;
+  if (const auto* const root = std::ranges::find_if(kZarrFiles, is_there);
+      root != kZarrFiles.end()) {
+    storage->set_root(*root);
+    return storage;
+  }
   if (storage->was_refused())
     throw Error(fmt::format(
         "cannot read '{}': the server refuses it (403 Forbidden), or there is no store; "

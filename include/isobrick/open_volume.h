@@ -17,7 +17,7 @@
 
 namespace isobrick::inline v0 {
 
-/// Where the stores of volumes that are no stores themselves are kept.
+/// Where the stores of volumes that are no stores themselves are kept, and bytes of remote ones.
 struct CacheOptions {
   /// Empty: nothing is kept; the store is in the folder of temporary files and goes with the
   /// OpenedVolume.
@@ -25,6 +25,9 @@ struct CacheOptions {
   /// Bytes of all stores in the folder. The ones that were used longest ago are removed first,
   /// never one that a process has open.
   std::uint64_t limit = std::uint64_t{20} << 30;
+  /// Bytes of remote stores that are kept in the folder, beside that limit; see RemoteOptions. 0:
+  /// nothing is kept of them.
+  std::uint64_t remote_limit = 0;
 };
 
 /// $XDG_CACHE_HOME/isobrick, else ~/.cache/isobrick; empty where neither is known.
@@ -40,7 +43,8 @@ struct OpenOptions {
   std::uint64_t memory = std::uint64_t{1} << 30;  ///< budget of the conversion, bytes
   int threads = 0;                                ///< 0: all cores
   /// Called with each of OpenedVolume::notes() when it comes up, which is before a conversion
-  /// begins; from the thread that opens. May be empty.
+  /// begins; from the thread that opens. Later, from any thread, with a note that nothing more is
+  /// kept of a remote store. May be empty.
   std::function<void(const std::string&)> on_note = {};
   /// Ends the operation with Cancelled, soon after a stop is requested on any thread.
   std::stop_token cancel = {};

@@ -101,6 +101,16 @@ struct RemoteOptions {
   /// tried again, after pauses that double, or the one that the server asks for.
   int tries = 7;
   double timeout_seconds = 30;  ///< without a connection or a byte
+  /// A cache on the disk: what was read is kept in the folder "remote" of this one, for whoever
+  /// reads it next. The server is asked whether an object has changed: of the metadata of the root
+  /// always, of others when ten minutes have gone by (or as Cache-Control says), or the root has
+  /// changed. Empty: nothing is kept.
+  std::filesystem::path cache_folder = {};
+  /// Bytes of all that is kept there; what was used longest ago goes first. 0: nothing is kept.
+  std::uint64_t cache_limit = 0;
+  /// Called once where the cache cannot be written to, from a thread that opens or reads. Reading
+  /// goes on without. May be empty.
+  std::function<void(const std::string&)> on_note = {};
   /// Ends requests, and reads that wait for them, with Cancelled.
   std::stop_token cancel = {};
 };

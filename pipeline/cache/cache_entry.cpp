@@ -17,6 +17,7 @@
 
 #include <isobrick/error.h>
 #include "core/file_error.h"
+#include "core/text_hash.h"
 #include "io/bytes/folder_walk.h"
 #include "io/bytes/leftovers.h"
 #include "io/bytes/output_file.h"
@@ -36,16 +37,10 @@ std::string plain_name(const std::string& name) {
   return plain.empty() || plain.front() == '.' ? "volume" + plain : plain;
 }
 
-/// FNV-1a, 64 bits. Entries of one hash tell each other apart by their keys.
-std::uint64_t hash_of(std::string_view text) {
-  std::uint64_t hash = 0xcbf29ce484222325;
-  for (const char c : text) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3;
-  return hash;
-}
-
-/// The folder of an entry, and whether a name is one: nobody else's folders are removed.
+/// The folder of an entry, and whether a name is one: nobody else's folders are removed. Entries of
+/// one hash tell each other apart by their keys.
 std::string folder_name(const std::string& name, const std::string& key) {
-  return fmt::format("{}-{:016x}", plain_name(name), hash_of(key));
+  return fmt::format("{}-{:016x}", plain_name(name), text_hash(key));
 }
 bool is_folder_name(const std::string& name) {
   constexpr std::size_t digits = 16;

@@ -171,6 +171,9 @@ struct OpenedVolume::Impl {
       refuse_grid(path, request);
       RemoteOptions remote;
       remote.memory = remote_memory(options.memory);
+      remote.cache_folder = options.cache.folder;
+      remote.cache_limit = options.cache.remote_limit;
+      remote.on_note = options.on_note;
       store.emplace(open_storage(path, remote), request.selection);
       if (!options.needs_ranges || has_all_ranges(*store)) return;
       store.reset();

@@ -102,7 +102,8 @@ def _reopened(path, arguments):
 
 
 def open(
-    source, *, cache=True, cache_limit=20 * 2**30, memory=2**30, threads=0, progress=None, **request
+    source, *, cache=True, cache_limit=20 * 2**30, remote_cache=None, memory=2**30, threads=0,
+    progress=None, **request
 ):
     """Opens a volume of any format as a `Volume`.
 
@@ -119,6 +120,8 @@ def open(
         they go with the volume.
     cache_limit : int or str
         Bytes of all stores in the cache.
+    remote_cache : int or str, optional
+        Bytes of stores behind URLs that are kept in the folder of the cache, too. None: nothing.
     memory : int or str
         Budget of a conversion in bytes, or a text such as "512M".
     threads : int
@@ -148,10 +151,12 @@ def open(
     with reporting(progress) as report:
         native = _isobrick.open(
             path, native_request, folder, byte_count(cache_limit, "cache_limit"),
+            0 if remote_cache is None else byte_count(remote_cache, "remote_cache"),
             byte_count(memory), thread_count(threads), report,
         )
     arguments = dict(
-        request, cache=cache, cache_limit=cache_limit, memory=memory, threads=threads
+        request, cache=cache, cache_limit=cache_limit, remote_cache=remote_cache, memory=memory,
+        threads=threads,
     )
     place = path if is_url(path) else os.path.abspath(path)
     return Volume(native, (_reopened, (place, arguments)))

@@ -43,10 +43,12 @@ const LevelInfo& level_of(const StoreReader& store, int level) {
 
 std::unique_ptr<OpenedVolume> open_volume(const std::string& path, const VolumeRequest& request,
                                           const std::string& cache, std::uint64_t cache_limit,
-                                          std::uint64_t memory, int threads,
-                                          const py::object& callback) {
-  const OpenOptions options{
-      .volume = request, .cache = {cache, cache_limit}, .memory = memory, .threads = threads};
+                                          std::uint64_t remote_limit, std::uint64_t memory,
+                                          int threads, const py::object& callback) {
+  const OpenOptions options{.volume = request,
+                            .cache = {cache, cache_limit, remote_limit},
+                            .memory = memory,
+                            .threads = threads};
   return interruptible(callback, [&](Reporter reporter) {
     return std::make_unique<OpenedVolume>(path, options, reporter.progress);
   });

@@ -270,7 +270,8 @@ def server(store):
     handler = functools.partial(RangeHandler, directory=folder)
     with http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler) as running:
         threading.Thread(target=running.serve_forever, daemon=True).start()
-        yield f"http://127.0.0.1:{running.server_address[1]}"
+        running.url = f"http://127.0.0.1:{running.server_address[1]}"
+        yield running
         running.shutdown()
 
 
@@ -283,11 +284,13 @@ class RangeHandler(http.server.SimpleHTTPRequestHandler):
             return self.send_error(404)
         with open(path, "rb") as file:
             data = file.read()
+        self.server.ranges = getattr(self.server, "ranges", 0) + 1
         first, last = (int(n) for n in self.headers["range"].split("=")[1].split("-"))
         self.send_response(206)
         part = data[first : last + 1]
         self.send_header("content-range", f"bytes {first}-{first + len(part) - 1}/{len(data)}")
         self.send_header("content-length", str(len(part)))
+        self.send_header("etag", f'"{hash(data):x}"')
         self.end_headers()
         self.wfile.write(part)
 
@@ -295,15 +298,30 @@ class RangeHandler(http.server.SimpleHTTPRequestHandler):
         pass
 
 
+def test_bytes_of_urls_are_kept(store, server, tmp_path):
+    def mesh():
+        server.ranges = 0
+        volume = isobrick.open(
+            f"{server.url}/{os.path.basename(store)}", cache=tmp_path, remote_cache="64M"
+        )
+        return volume.extract(100)
+
+    first, first_requests = mesh(), server.ranges
+    assert same(mesh(), first) and same(first, isobrick.open(store).extract(100))
+    assert server.ranges <= 1 < first_requests
+    with pytest.raises(isobrick.UsageError, match="remote_cache"):
+        isobrick.open(store, remote_cache="lots")
+
+
 def test_stores_behind_urls(store, server):
-    url = f"{server}/{os.path.basename(store)}"
+    url = f"{server.url}/{os.path.basename(store)}"
     remote, local = isobrick.open(url), isobrick.open(store)
     assert remote.shape == local.shape and remote.path == url
     assert np.array_equal(remote[3:9, ::2, 5], local[3:9, ::2, 5])
     assert same(remote.extract(100), local.extract(100))
     assert same(pickle.loads(pickle.dumps(remote)).extract(100), local.extract(100))
     with pytest.raises(isobrick.Error, match="nothing.zarr' is no store"):
-        isobrick.open(f"{server}/nothing.zarr")
+        isobrick.open(f"{server.url}/nothing.zarr")
     with pytest.raises(isobrick.UsageError, match="nothing can be written to a URL"):
         isobrick.index(url, "octree")
 

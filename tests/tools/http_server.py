@@ -28,7 +28,8 @@ import sys
 import time
 from urllib.parse import parse_qsl, quote, unquote, urlsplit
 
-REASONS = {200: "OK", 206: "Partial Content", 403: "Forbidden", 404: "Not Found", 412: "Changed",
+REASONS = {200: "OK", 206: "Partial Content", 304: "Not Modified",
+           403: "Forbidden", 404: "Not Found", 412: "Changed",
            416: "Range Not Satisfiable", 429: "Too Many Requests", 500: "Error",
            503: "Service Unavailable"}
 
@@ -127,6 +128,8 @@ class Server:
         tag = '"%x-%x-%x"' % (state.st_mtime_ns, size, self.changes)
         if headers.get("if-match", tag) != tag:
             return await self.send(writer, 412)
+        if headers.get("if-none-match") == tag:
+            return await self.send(writer, 304)
         more, status, begin, end = [f"ETag: {tag}"], 200, 0, size
         if "range" in headers and mode != "noranges":
             first, _, last = headers["range"].removeprefix("bytes=").partition("-")

@@ -1,52 +1,13 @@
-#include <csignal>
-#include <cstdlib>
 #include <filesystem>
 #include <memory>
 
-#include <sys/wait.h>
-#include <unistd.h>
-
 #include <fmt/format.h>
 
+#include "tests/tools/http_server.h"
 #include "tests/tools/program.h"
 
 namespace isobrick::test {
 namespace {
-
-/// http_server.py, which serves a folder while the test runs.
-class Server {
- public:
-  explicit Server(const std::string& folder) {
-    int ends[2];
-    if (::pipe(ends) != 0) return;
-    process_ = ::fork();
-    if (process_ == 0) {
-      ::dup2(ends[1], STDOUT_FILENO);
-      ::close(ends[0]);
-      ::execlp("python3", "python3", ISOBRICK_SOURCE "/tests/tools/http_server.py", folder.c_str(),
-               nullptr);
-      ::_exit(127);
-    }
-    ::close(ends[1]);
-    std::string text;
-    for (char c = 0; ::read(ends[0], &c, 1) == 1 && c != '\n';) text += c;
-    ::close(ends[0]);
-    port_ = std::atoi(text.c_str());
-  }
-  ~Server() {
-    if (process_ <= 0) return;
-    ::kill(process_, SIGKILL);
-    ::waitpid(process_, nullptr, 0);
-  }
-  Server(const Server&) = delete;
-  Server& operator=(const Server&) = delete;
-
-  int port() const { return port_; }
-
- private:
-  pid_t process_ = -1;
-  int port_ = 0;
-};
 
 class Url : public ProgramTest {
  protected:
@@ -58,7 +19,7 @@ class Url : public ProgramTest {
                    "16", "--shard", "64"})
                   .exit_code,
               0);
-    server_ = std::make_unique<Server>(path(""));
+    server_ = std::make_unique<HttpServer>(path(""));
     ASSERT_GT(server_->port(), 0);
     expected_ = mesh_of(store_);
   }
@@ -78,7 +39,7 @@ class Url : public ProgramTest {
   }
 
   std::string store_, expected_;
-  std::unique_ptr<Server> server_;
+  std::unique_ptr<HttpServer> server_;
 };
 
 TEST_F(Url, MeshesAreThoseOfTheFolder) {
@@ -131,6 +92,11 @@ TEST_F(Url, ZipsAreReadToo) {
 TEST_F(Url, EveryReadingCommandTakesThem) {
   const nlohmann::json info = run_json({"info", url("plain")});
   EXPECT_EQ(info.at("extent"), run_json({"info", store_}).at("extent"));
+  const nlohmann::json here = run_json({"info", store_, "--stats"}),
+                       there = run_json({"info", url("plain"), "--stats"});
+  for (const char* name : {"levels", "histogram", "value_range", "raw_bytes"})
+    EXPECT_EQ(here.at(name), there.at(name)) << name;
+  EXPECT_TRUE(there.at("bytes").is_null());
   EXPECT_EQ(run({"verify", url("plain")}).exit_code, 0);
   ASSERT_EQ(run({"convert", url("plain"), path("copy.zarr"), "--brick", "32"}).exit_code, 0);
   EXPECT_TRUE(mesh_of(path("copy.zarr")) == expected_);
