@@ -11,6 +11,7 @@
 #include <utility>
 
 #include <isobrick/error.h>
+#include "io/http/curl_authorities.h"
 
 namespace isobrick::inline v0 {
 namespace {
@@ -295,6 +296,7 @@ void CurlLoop::set_options(Transfer& t) const {
   set(CURLOPT_ERRORBUFFER, t.error);
   set(CURLOPT_HTTP_VERSION, static_cast<long>(CURL_HTTP_VERSION_2TLS));
   set(CURLOPT_PIPEWAIT, 1L);
+  set_authorities(easy, options_.s3.has_value());
   set(CURLOPT_BUFFERSIZE, 512L << 10);
   set(CURLOPT_PROTOCOLS_STR, "http,https");
   set(CURLOPT_REDIR_PROTOCOLS_STR, "http,https");
