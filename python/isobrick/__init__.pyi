@@ -579,6 +579,7 @@ def open(
     *,
     cache: Union[bool, _Path] = True,
     cache_limit: _Bytes = ...,
+    remote_cache: Optional[_Bytes] = None,
     memory: _Bytes = ...,
     threads: int = 0,
     progress: _Progress = None,
