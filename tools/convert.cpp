@@ -9,8 +9,10 @@
 #include <isobrick/error.h>
 #include "core/stopwatch.h"
 #include "io/bytes/output_folder.h"
+#include "io/bytes/url.h"
 #include "pipeline/convert/convert_staging.h"
 #include "pipeline/convert/store_source.h"
+#include "tools/bucket_output.h"
 #include "tools/input.h"
 #include "tools/interrupt.h"
 #include "tools/job.h"
@@ -96,10 +98,40 @@ ConvertReport convert_by_ranks(VolumeSource& source, const std::string& out, Con
   return report;
 }
 
+void note_downsampling(const VolumeSource& source, const ConvertOptions& options,
+                       Console& console) {
+  if (source.info().labels && options.downsampling && *options.downsampling == Downsampling::mean)
+    console.note(
+        "it is a label image, and --downsample mean makes labels of coarser levels that none of "
+        "its samples has; mode, the default, does not");
+}
+
+/// By way of a temporary folder: nothing can be appended to an object.
+int convert_to_bucket(const ConvertArguments& arguments, const std::string& out, Console& console) {
+  ConvertOptions options = arguments.store;
+  if (options.part || options.join > 0 || options.resume)
+    throw UsageError(fmt::format(
+        "'{}': --part, --join and --resume need a folder; convert to one and upload its store with "
+        "the tools of the bucket",
+        out));
+  if (join_job(arguments.mpi, console) != nullptr)
+    throw UsageError(fmt::format(
+        "'{}': the ranks of a job write to a folder; convert to one, or with one process", out));
+  BucketOutput bucket(out, options.force, options.memory);
+  const auto source = open_input(arguments, options);
+  note_downsampling(*source, options, console);
+  set_interrupt_note([] { return "the same command with --force begins anew"; });
+  const ConvertReport report = convert(*source, bucket.folder(), options, console.progress());
+  bucket.upload(console.progress());
+  report_conversion(console, "convert", arguments.in, out, source->info(), report, source->notes());
+  return 0;
+}
+
 int run_convert(const ConvertArguments& arguments, Console& console) {
   const std::string out = arguments.out.empty()
                               ? stem_of_input(arguments.in, arguments.volume) + ".zarr"
                               : arguments.out;
+  if (is_url(out)) return convert_to_bucket(arguments, out, console);
   check_store_name(out);
   ConvertOptions options = arguments.store;
   const bool is_whole = !options.part && options.join == 0;
@@ -111,11 +143,7 @@ int run_convert(const ConvertArguments& arguments, Console& console) {
     set_interrupt_note([] { return "the same command goes on with what is done"; });
   else
     note_conversion(out);
-  if (source->info().labels && options.downsampling && *options.downsampling == Downsampling::mean)
-    console.note(
-        "it is a label image, and --downsample mean makes labels of coarser levels that none of "
-        "its "
-        "samples has; mode, the default, does not");
+  note_downsampling(*source, options, console);
   const ConvertReport report =
       job != nullptr        ? convert_by_ranks(*source, out, options, *job, console)
       : arguments.in == "-" ? convert_stream(*source, out, options, console)
@@ -140,7 +168,7 @@ void add_convert(Program& program) {
            "Volume of a known format, FILE:/NAME for an array in it, folder of slices, Zarr, raw "
            "file, or - for raw samples on standard input");
   add_output_or_positional(
-      app, arguments->out, "ZARR", "Store to write, such as OUT.zarr",
+      app, arguments->out, "ZARR", "Store to write, such as OUT.zarr or s3://BUCKET/OUT.zarr",
       "head.zarr of head.nrrd, run_data.zarr of run.h5:/data, in the current folder");
   add_volume_options(app, arguments->volume);
   add_region(app, arguments->region);

@@ -15,6 +15,7 @@
 #include <isobrick/error.h>
 #include "bricks/storage/remote_object.h"
 #include "bricks/storage/remote_url.h"
+#include "bricks/storage/s3_xml.h"
 #include "bricks/storage/storage_keys.h"
 #include "core/text_hash.h"
 
@@ -70,15 +71,6 @@ void ask_for_change(HttpRequest& request, const ObjectState& state) {
 /// Metadata of the root, which tell whether a store was written anew.
 bool is_root_file(const std::string& key) {
   return std::ranges::find(kZarrFiles, key) != kZarrFiles.end();
-}
-
-std::string xml_decoded(std::string text) {
-  for (const auto& [entity, character] :
-       {std::pair("&lt;", "<"), std::pair("&gt;", ">"), std::pair("&quot;", "\""),
-        std::pair("&apos;", "'"), std::pair("&amp;", "&")})
-    for (std::size_t at = 0; (at = text.find(entity, at)) != text.npos; ++at)
-      text.replace(at, std::string_view(entity).size(), character);
-  return text;
 }
 
 class RemoteStorage final : public Storage, public std::enable_shared_from_this<RemoteStorage> {
@@ -270,19 +262,6 @@ class RemoteStorage final : public Storage, public std::enable_shared_from_this<
   mutable std::atomic<bool> was_refused_ = false;
 };
 
-/// What is between the tags of the next element of a name from `at` on, which moves behind it;
-/// nullopt: there is none.
-std::optional<std::string> next_element(const std::string& xml, std::string_view name,
-                                        std::size_t& at) {
-  const std::string open = fmt::format("<{}>", name), close = fmt::format("</{}>", name);
-  const std::size_t begin = xml.find(open, at);
-  if (begin == xml.npos) return std::nullopt;
-  const std::size_t end = xml.find(close, begin);
-  if (end == xml.npos) return std::nullopt;
-  at = end + close.size();
-  return xml.substr(begin + open.size(), end - begin - open.size());
-}
-
 /// A zip lies in a storage of its own folder, under its name.
 std::pair<std::string, std::string> split_last(const std::string& url) {
   const std::size_t question = std::min(url.find('?'), url.size());
@@ -295,26 +274,6 @@ HttpOptions http_options(const RemotePlace& place, const RemoteOptions& options)
 }
 
 }  // namespace
-
-S3Listing parse_s3_listing(const std::string& xml, const std::string& prefix) {
-  if (xml.find("<ListBucketResult") == xml.npos)
-    throw Error("the server's list of objects is no ListBucketResult");
-  S3Listing listing;
-  for (const char* outer : {"Contents", "CommonPrefixes"})
-    for (std::size_t at = 0; const auto element = next_element(xml, outer, at);) {
-      std::size_t inner = 0;
-      auto key = next_element(*element, *outer == 'C' && outer[2] == 'n' ? "Key" : "Prefix", inner);
-      if (key) key = xml_decoded(std::move(*key));
-      if (!key || !key->starts_with(prefix)) continue;
-      key->erase(0, prefix.size());
-      while (key->ends_with('/')) key->pop_back();
-      if (!key->empty()) listing.names.push_back(std::move(*key));
-    }
-  std::size_t at = 0;
-  if (next_element(xml, "IsTruncated", at) == "true")
-    listing.next = xml_decoded(next_element(xml, "NextContinuationToken", at = 0).value_or(""));
-  return listing;
-}
 
 std::shared_ptr<const Storage> remote_storage(const std::string& url, const RemoteOptions& options,
                                               std::shared_ptr<HttpClient> client) {

@@ -18,12 +18,4 @@ std::shared_ptr<const Storage> remote_storage(const std::string& url, const Remo
 std::shared_ptr<const Storage> open_remote_storage(const std::string& url,
                                                    const RemoteOptions& options);
 
-/// Names below a prefix in a reply of S3's ListObjectsV2, without the prefix. Throws Error for
-/// another reply.
-struct S3Listing {
-  std::vector<std::string> names;
-  std::string next;  ///< the token of the next part, or ""
-};
-S3Listing parse_s3_listing(const std::string& xml, const std::string& prefix);
-
 }  // namespace isobrick

@@ -25,6 +25,7 @@
 #include <isobrick/recode.h>
 #include <isobrick/store_reader.h>
 #include <isobrick/synth_source.h>
+#include <isobrick/upload.h>
 #include <isobrick/verify.h>
 #include <isobrick/version.h>
 #include <isobrick/volume.h>

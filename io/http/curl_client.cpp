@@ -326,7 +326,10 @@ void CurlLoop::set_options(Transfer& t) const {
       set(CURLOPT_READDATA, &t);
       set(CURLOPT_SEEKFUNCTION, &Transfer::on_seek);
       set(CURLOPT_SEEKDATA, &t);
-      headers.emplace_back("Expect:");
+      // libcurl would sign a header that is left out so; then a server that never replies to it
+      // must not be waited for.
+      if (!options_.s3) headers.emplace_back("Expect:");
+      set(CURLOPT_EXPECT_100_TIMEOUT_MS, 100L);
     }
   }
   if (const auto& s3 = options_.s3) {
@@ -364,7 +367,8 @@ void CurlLoop::finish(CURL* easy, CURLcode code) {
   if (can_help && t.tries < tries) return try_again(std::move(transfer));
   const std::string count = t.tries > 1 ? fmt::format(" ({} tries)", t.tries) : "";
   const auto error = std::make_exception_ptr(
-      Error(fmt::format("cannot read '{}': {}{}", t.request.url, why, count)));
+      Error(fmt::format("cannot {} '{}': {}{}", t.request.method == "GET" ? "read" : "write",
+                        t.request.url, why, count)));
   t.done({}, error);
 }
 

@@ -70,6 +70,7 @@ const std::map<std::string, Names> kPublicHeaders = {
     {"pipeline/labels", {"labels"}},
     {"pipeline/pieces", {"pieces"}},
     {"pipeline/sample", {"attributes"}},
+    {"pipeline/upload", {"upload"}},
     {"pipeline/verify", {"verify"}},
     {"pipeline/volume", {"device_extractor", "volume", "volume_extractor"}},
     {"isobrick", {"isobrick"}},

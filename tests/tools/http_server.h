@@ -53,6 +53,14 @@ class HttpServer {
     int requests = 0;
     long bytes = 0;
   };
+  /// What the server answers to /requests and so on.
+  std::string get(const std::string& name) const {
+    return run_process(
+               {"python3", "-c",
+                "import sys, urllib.request as r; print(r.urlopen(sys.argv[1]).read().decode())",
+                fmt::format("http://127.0.0.1:{}/{}", port_, name)})
+        .out;
+  }
   Traffic take_traffic() const {
     Traffic traffic;
     std::istringstream(get("requests")) >> traffic.requests >> traffic.bytes;
@@ -61,14 +69,6 @@ class HttpServer {
   }
 
  private:
-  std::string get(const std::string& name) const {
-    return run_process(
-               {"python3", "-c",
-                "import sys, urllib.request as r; print(r.urlopen(sys.argv[1]).read().decode())",
-                fmt::format("http://127.0.0.1:{}/{}", port_, name)})
-        .out;
-  }
-
   pid_t process_ = -1;
   int port_ = 0;
 };

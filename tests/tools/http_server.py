@@ -15,9 +15,15 @@ Prints its port. The first part of a path names what is wrong with it:
     /changing/…         another ETag at each reply
     /secret/…           403 without "?token=abc"
     /bucket/…           as S3: the keys of a bucket, for requests that key "AKTEST" with the secret
-                        "s/e+cret" has signed for the region "test-1"; lists them too
+                        "s/e+cret" has signed for the region "test-1"; lists them too, and
+                        objects can be written and removed, also in parts
+    /bucket-FAULT/…     … where writing fails: "busy" (each first try of it gets 503), "reset" (or
+                        ends without a reply), "late" (an upload in parts is complete, but the first
+                        reply is lost), "denied" (the second part gets 403), "false" (completing
+                        it fails with the status 200)
 
 GET /requests returns how many there were, and how many bytes were sent; GET /reset sets both to 0.
+GET /uploads returns how many uploads in parts are not complete, and how many were.
 """
 
 import asyncio
@@ -28,8 +34,8 @@ import sys
 import time
 from urllib.parse import parse_qsl, quote, unquote, urlsplit
 
-REASONS = {200: "OK", 206: "Partial Content", 304: "Not Modified",
-           403: "Forbidden", 404: "Not Found", 412: "Changed",
+REASONS = {200: "OK", 204: "No Content", 206: "Partial Content", 304: "Not Modified",
+           400: "Bad Request", 403: "Forbidden", 404: "Not Found", 412: "Changed",
            416: "Range Not Satisfiable", 429: "Too Many Requests", 500: "Error",
            503: "Service Unavailable"}
 
@@ -45,7 +51,7 @@ def is_signed(line, headers):
         return False
     parts = urlsplit(line[1])
     names = fields["SignedHeaders"].split(";")
-    if not {"host", "x-amz-date", "x-amz-content-sha256"} <= set(names):
+    if not {"host", "x-amz-date", "x-amz-content-sha256"} <= set(names) <= set(headers):
         return False
     query = "&".join(f"{quote(k, safe='-_.~')}={quote(v, safe='-_.~')}"
                      for k, v in sorted(parse_qsl(parts.query, keep_blank_values=True)))
@@ -67,6 +73,9 @@ class Server:
         self.seen = {}
         self.requests = self.bytes = self.changes = 0
         self.link_free = 0.0
+        self.uploads = {}
+        self.completed = 0
+        self.written = []
 
     async def run(self, reader, writer):
         try:
@@ -85,14 +94,25 @@ class Server:
         while (header := (await reader.readline()).strip()):
             name, _, value = header.decode("latin-1").partition(":")
             headers[name.lower()] = value.strip()
+        if headers.get("expect") == "100-continue":
+            writer.write(b"HTTP/1.1 100 Continue\r\n\r\n")
+        body = await reader.readexactly(int(headers.get("content-length", 0)))
         parts = urlsplit(line[1])
         path = unquote(parts.path).strip("/")
+        if path == "uploads":
+            return await self.send(writer, 200, f"{len(self.uploads)} {self.completed}".encode())
+        if path == "written":
+            return await self.send(writer, 200, "\n".join(self.written).encode())
         if path in ("requests", "reset"):
             if path == "reset":
                 self.requests = self.bytes = 0
             return await self.send(writer, 200, f"{self.requests} {self.bytes}".encode())
         self.requests += 1
         mode, _, name = path.partition("/")
+        if line[0] in ("PUT", "POST", "DELETE"):
+            if not mode.startswith("bucket") or not is_signed(line, headers):
+                return await self.send(writer, 403, b"<Error><Code>AccessDenied</Code></Error>")
+            return await self.write(writer, line, mode, name, parts.query, body)
         mode, *numbers = mode.split(":")
         return await self.answer(writer, line, mode, [int(n) for n in numbers], name, headers,
                                  parts.query)
@@ -112,7 +132,7 @@ class Server:
         if mode == "reset" and fails:
             writer.transport.abort()
             return False
-        if mode == "bucket":
+        if mode.startswith("bucket"):
             if not is_signed(line, headers):
                 return await self.send(writer, 403, b"<Error><Code>SignatureDoesNotMatch</Code>")
             if not name:
@@ -151,6 +171,58 @@ class Server:
             return False
         return await self.send(writer, status, data, more)
 
+    async def write(self, writer, line, mode, name, query, body):
+        """PUT, POST and DELETE of a bucket."""
+        file = os.path.join(self.folder, name)
+        query = dict(parse_qsl(query, keep_blank_values=True))
+        upload = query.get("uploadId")
+        tries = self.seen.get((*line, mode), 0) + 1
+        self.seen[(*line, mode)] = tries
+        if mode == "bucket-busy" and tries == 1:
+            return await self.send(writer, 503, b"<Error><Code>SlowDown</Code></Error>")
+        if mode == "bucket-reset" and tries == 1:
+            writer.transport.abort()
+            return False
+        if mode == "bucket-denied" and query.get("partNumber") == "2":
+            return await self.send(writer, 403, b"<Error><Code>AccessDenied</Code></Error>")
+        if upload is not None and upload not in self.uploads:
+            return await self.send(writer, 404, b"<Error><Code>NoSuchUpload</Code></Error>")
+        if line[0] == "DELETE":
+            if upload:
+                del self.uploads[upload]
+            elif os.path.exists(file):
+                os.remove(file)
+                self.written.append("-" + name)
+            return await self.send(writer, 204)
+        if "uploads" in query:
+            upload = f"id/+{len(self.seen)}=="
+            self.uploads[upload] = {}
+            return await self.send(writer, 200, f"<UploadId>{upload}</UploadId>".encode())
+        if line[0] == "PUT" and upload:
+            tag = f'"{hashlib.md5(body).hexdigest()}"'
+            self.uploads[upload][int(query["partNumber"])] = (tag, body)
+            return await self.send(writer, 200, b"", [f"ETag: {tag}"])
+        if line[0] == "POST":
+            if mode == "bucket-false":
+                return await self.send(writer, 200, b"<Error><Code>InternalError</Code></Error>")
+            parts = sorted(self.uploads[upload].items())
+            expected = "".join(f"<Part><PartNumber>{n}</PartNumber><ETag>{tag}</ETag></Part>"
+                               for n, (tag, _) in parts)
+            small = any(len(data) < 5 << 20 for _, (_, data) in parts[:-1])
+            if small or body.decode() != f"<CompleteMultipartUpload>{expected}</CompleteMultipartUpload>":
+                return await self.send(writer, 400, b"<Error><Code>InvalidPart</Code></Error>")
+            body = b"".join(data for _, (_, data) in parts)
+            del self.uploads[upload]
+            self.completed += 1
+        os.makedirs(os.path.dirname(file), exist_ok=True)
+        with open(file, "wb") as opened:
+            opened.write(body)
+        self.written.append(name)
+        if mode == "bucket-late" and upload:
+            writer.transport.abort()
+            return False
+        return await self.send(writer, 200, b"<CompleteMultipartUploadResult/>" if upload else b"")
+
     def listing(self, query):
         """What is directly below a prefix, a name at a time, so that lists have several parts."""
         query = dict(parse_qsl(query))
@@ -160,7 +232,8 @@ class Server:
             for file in files:
                 key = os.path.relpath(os.path.join(folder, file), self.folder)
                 if key.startswith(prefix):
-                    rest, slash, _ = key[len(prefix):].partition("/")
+                    delimiter = query.get("delimiter", "\0")
+                    rest, slash, _ = key[len(prefix):].partition(delimiter)
                     found[prefix + rest + slash] = bool(slash)
         names = sorted(n for n in found if n > after)
         text = "<ListBucketResult>"

@@ -7,7 +7,7 @@
 #include <map>
 
 #include <isobrick/error.h>
-#include "bricks/storage/remote_storage.h"
+#include "bricks/storage/s3_xml.h"
 
 namespace isobrick {
 namespace {
