@@ -46,7 +46,7 @@ std::optional<RangeName> parse_range_name(std::string_view name, std::string_vie
 }
 
 /// CRC-32C of a block, or of the checksums of a range.
-std::uint32_t checksum_of(std::span<const std::byte> bytes) {
+std::uint32_t block_checksum(std::span<const std::byte> bytes) {
   auto* const data =
       const_cast<unsigned char*>(reinterpret_cast<const unsigned char*>(bytes.data()));
   return crc32_iscsi(data, static_cast<int>(bytes.size()), ~0u);
@@ -64,8 +64,8 @@ std::vector<std::uint32_t> block_checksums(std::span<const std::byte> bytes) {
   std::vector<std::uint32_t> checksums;
   for (std::size_t at = 0; at < bytes.size(); at += kBlock)
     checksums.push_back(
-        checksum_of(bytes.subspan(at, std::min<std::size_t>(kBlock, bytes.size() - at))));
-  checksums.push_back(checksum_of(std::as_bytes(std::span(checksums))));
+        block_checksum(bytes.subspan(at, std::min<std::size_t>(kBlock, bytes.size() - at))));
+  checksums.push_back(block_checksum(std::as_bytes(std::span(checksums))));
   return checksums;
 }
 
@@ -88,7 +88,7 @@ bool read_blocks(int fd, std::uint64_t range_size, std::uint64_t begin, std::spa
   if (::fstat(fd, &status) != 0 ||
       static_cast<std::uint64_t>(status.st_size) != file_bytes(range_size) ||
       !read_exactly(fd, 0, table) ||
-      checksum_of(table.first(table.size() - sizeof(std::uint32_t))) != checksums.back())
+      block_checksum(table.first(table.size() - sizeof(std::uint32_t))) != checksums.back())
     return false;
   std::vector<std::byte> part;
   for (std::uint64_t at = 0; at < out.size();) {
@@ -101,7 +101,7 @@ bool read_blocks(int fd, std::uint64_t range_size, std::uint64_t begin, std::spa
       part.resize(kBlock);
       whole = std::span(part).first(size);
     }
-    if (!read_exactly(fd, table.size() + first, whole) || checksum_of(whole) != checksums[block])
+    if (!read_exactly(fd, table.size() + first, whole) || block_checksum(whole) != checksums[block])
       return false;
     if (count < size)
       std::copy_n(part.begin() + static_cast<std::ptrdiff_t>(skipped), count, wanted.begin());

@@ -1,3 +1,4 @@
+#include <csignal>
 #include <filesystem>
 #include <memory>
 #include <set>
@@ -24,7 +25,8 @@ class Bucket : public ProgramTest {
     ASSERT_GT(server_->port(), 0);
   }
 
-  Outcome with_bucket(const Arguments& words, const std::string& secret = "s/e+cret") {
+  Outcome with_bucket(const Arguments& words, const std::string& secret = "s/e+cret",
+                      const Surroundings& surroundings = {}) {
     Arguments all{"env",
                   "AWS_ENDPOINT_URL_S3=" + server_->url("", ""),
                   "AWS_ACCESS_KEY_ID=AKTEST",
@@ -33,7 +35,7 @@ class Bucket : public ProgramTest {
                   "TMPDIR=" + path("tmp"),
                   ISOBRICK_PROGRAM};
     all.insert(all.end(), words.begin(), words.end());
-    return run_process(all);
+    return run_process(all, surroundings);
   }
   /// Several shards and levels; each of a few kilobytes.
   Arguments small(const std::string& out) const {
@@ -123,6 +125,15 @@ TEST_F(Bucket, AFailureLeavesNothingThatCanBeRead) {
   expect_refused(with_bucket(small("s3://bucket/b.zarr"), "wrong"), 1,
                  {"s3://bucket/b.zarr", "403", "credentials"});
   EXPECT_TRUE(fs::is_empty(path("objects")));
+}
+
+TEST_F(Bucket, AnInterruptAbortsParts) {
+  const Outcome outcome =
+      with_bucket(large("s3://bucket-hang/large.zarr"), "s/e+cret", {.interrupt_after = 2});
+  EXPECT_EQ(outcome.signal, SIGINT) << outcome.err;
+  EXPECT_EQ(server_->get("uploads"), "0 0\n");
+  EXPECT_FALSE(fs::exists(path("objects/large.zarr/zarr.json")));
+  EXPECT_TRUE(fs::is_empty(path("tmp")));
 }
 
 TEST_F(Bucket, WhatIsThereIsReplacedByForceOnly) {
