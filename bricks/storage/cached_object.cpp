@@ -113,9 +113,10 @@ bool read_blocks(int fd, std::uint64_t range_size, std::uint64_t begin, std::spa
 }  // namespace
 
 CachedObject::CachedObject(std::shared_ptr<RangeCache> cache, const std::string& url,
-                           const ObjectState& state)
+                           const ObjectState& state, const std::string& root_url)
     : cache_(std::move(cache)),
       folder_(cache_->folder_of(url)),
+      root_folder_(root_url.empty() ? fs::path() : cache_->folder_of(root_url)),
       prefix_(fmt::format("{:016x}-", state.hash())) {}
 
 fs::path CachedObject::file_of(std::uint64_t offset, std::uint64_t size) const {
@@ -217,6 +218,11 @@ std::size_t CachedObject::read(std::uint64_t offset, std::span<std::byte> out) c
   if (fd.get() >= 0) cache_->remove(file);
   remove(piece.file_offset, piece.file_size);
   return 0;
+}
+
+void CachedObject::forget() const {
+  cache_->forget(folder_);
+  if (!root_folder_.empty()) cache_->note_change(root_folder_);
 }
 
 void CachedObject::write(std::uint64_t offset, std::span<const std::byte> bytes) const {

@@ -18,7 +18,9 @@ namespace isobrick::inline v0 {
 /// checksums of its blocks. Thread-safe. No function throws.
 class CachedObject {
  public:
-  CachedObject(std::shared_ptr<RangeCache> cache, const std::string& url, const ObjectState& state);
+  /// `root_url` names the metadata of its store; "": not known.
+  CachedObject(std::shared_ptr<RangeCache> cache, const std::string& url, const ObjectState& state,
+               const std::string& root_url = {});
 
   /// How many bytes from `offset` on are not kept: 0 where that byte is, `size` at most.
   std::uint64_t missing(std::uint64_t offset, std::uint64_t size) const;
@@ -29,8 +31,9 @@ class CachedObject {
   std::size_t read(std::uint64_t offset, std::span<std::byte> out) const;
   /// Keeps these bytes.
   void write(std::uint64_t offset, std::span<const std::byte> bytes) const;
-  /// The object is in another state now.
-  void forget() const { cache_->forget(folder_); }
+  /// The object is in another state now, and so may others of its store be: the server is to be
+  /// asked again for all of them.
+  void forget() const;
 
  private:
   /// Bytes up to `end` are in the file of a range.
@@ -50,7 +53,7 @@ class CachedObject {
   std::filesystem::path file_of(std::uint64_t offset, std::uint64_t size) const;
 
   std::shared_ptr<RangeCache> cache_;
-  std::filesystem::path folder_;
+  std::filesystem::path folder_, root_folder_;
   std::string prefix_;  ///< of the names of files of this state
   mutable std::mutex mutex_;
   mutable bool is_listed_ = false;

@@ -174,6 +174,16 @@ void RangeCache::put(const fs::path& folder, const CachedState& state) {
 
 void RangeCache::forget(const fs::path& folder) { remove(folder / kStateFile); }
 
+void RangeCache::note_change(const fs::path& root_folder) {
+  const auto now = std::chrono::system_clock::now().time_since_epoch();
+  put(root_folder, {.root = static_cast<std::uint64_t>(now.count())});
+}
+
+std::uint64_t RangeCache::last_change(const fs::path& root_folder) const {
+  const auto known = find(root_folder);
+  return known ? known->root : 0;
+}
+
 bool RangeCache::write(const fs::path& file,
                        std::initializer_list<std::span<const std::byte>> parts) {
   static std::atomic<std::uint64_t> count = 0;

@@ -51,6 +51,10 @@ class RangeCache {
   void put(const std::filesystem::path& folder, const CachedState& state);
   /// The server is to be asked again.
   void forget(const std::filesystem::path& folder);
+  /// Something in the store with the root of a folder has changed. The number of its last change,
+  /// 0 where none is known.
+  void note_change(const std::filesystem::path& root_folder);
+  std::uint64_t last_change(const std::filesystem::path& root_folder) const;
 
   /// Writes a file of these parts, one after another. False where it is not kept.
   bool write(const std::filesystem::path& file,

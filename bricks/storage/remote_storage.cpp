@@ -134,8 +134,12 @@ class RemoteStorage final : public Storage, public std::enable_shared_from_this<
   /// cache need not ask for each object again.
   void set_root(const std::string& key) const {
     const Object object = cache_ ? begin_open(key).object.get() : nullptr;
-    if (object && object->state().is_known())
-      root_ = text_hash(url_of(key) + '\n' + std::to_string(object->state().hash()));
+    if (!object || !object->state().is_known()) return;
+    const std::string url = url_of(key);
+    root_ = text_hash(fmt::format("{}\n{}\n{}", url, object->state().hash(),
+                                  cache_->last_change(cache_->folder_of(url))));
+    const std::lock_guard lock(mutex_);
+    root_url_ = url;
   }
 
  private:
@@ -208,8 +212,10 @@ class RemoteStorage final : public Storage, public std::enable_shared_from_this<
   Object make_object(const std::string& key, const ObjectState& state,
                      bool may_be_kept = true) const {
     std::unique_ptr<const CachedObject> cached;
-    if (cache_ && may_be_kept && state.is_known())
-      cached = std::make_unique<const CachedObject>(cache_, url_of(key), state);
+    if (cache_ && may_be_kept && state.is_known()) {
+      const std::lock_guard lock(mutex_);
+      cached = std::make_unique<const CachedObject>(cache_, url_of(key), state, root_url_);
+    }
     return std::make_shared<const RemoteObject>(fetcher_, name_of(key), url_of(key), state,
                                                 std::move(cached));
   }
@@ -257,6 +263,7 @@ class RemoteStorage final : public Storage, public std::enable_shared_from_this<
   std::shared_ptr<RangeCache> cache_;            ///< null: nothing is kept on the disk
   mutable std::atomic<std::uint64_t> root_ = 0;  ///< 0: not known
   mutable std::mutex mutex_;
+  mutable std::string root_url_;  ///< "": not known
   mutable std::unordered_map<std::string, Opened> opened_;
   mutable std::deque<std::string> keys_;  ///< of `opened_`, oldest first
   mutable std::atomic<bool> was_refused_ = false;

@@ -1,3 +1,4 @@
+#include <chrono>
 #include <filesystem>
 #include <fstream>
 #include <memory>
@@ -107,6 +108,21 @@ TEST_F(RemoteCache, AStoreThatChangedIsReadAnew) {
   const std::string expected = mesh_of(path("served/smooth.zarr"));
   ASSERT_TRUE(expected != first);
   EXPECT_TRUE(mesh_of(url()) == expected);
+  EXPECT_TRUE(mesh_of(url()) == expected);
+}
+
+TEST_F(RemoteCache, ShardsThatChangedAreNoticedWhereBytesAreMissing) {
+  const std::string expected = mesh_of(path("served/smooth.zarr"));
+  Arguments words{"extract", url(), "--isovalue", "127.5", "-o", path("part.ply"), "-q"};
+  words.insert(words.end(), {"--roi", "0:66,0:66,0:66"});
+  ASSERT_EQ(run(cached(words)).exit_code, 0);
+  // The root stays as it is, so that nobody asks for the shards again.
+  for (const auto& entry : fs::recursive_directory_iterator(path("served/smooth.zarr/0/c")))
+    if (entry.is_regular_file())
+      fs::last_write_time(entry.path(), entry.last_write_time() - std::chrono::hours(1));
+  const Outcome outcome = extract(url());
+  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_NE(outcome.out.find("open the store anew"), std::string::npos) << outcome.out;
   EXPECT_TRUE(mesh_of(url()) == expected);
 }
 
