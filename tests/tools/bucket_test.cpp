@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <csignal>
 #include <filesystem>
 #include <memory>
@@ -110,6 +111,16 @@ TEST_F(Bucket, LargeObjectsGoInParts) {
     expect_no_leftovers();
   }
   EXPECT_EQ(server_->get("uploads"), "0 4\n");
+}
+
+TEST_F(Bucket, BytesThatWaitForTheNetworkAreFew) {
+  write_file(path("large.raw"), noise(640 * 320 * 320));
+  Arguments words = large("s3://bucket-slow/large.zarr");
+  *std::find(words.begin(), words.end(), "300,256,256") = "640,320,320";
+  words.insert(words.end(), {"--levels", "1"});
+  const Outcome outcome = with_bucket(words);
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_LE(nlohmann::json::parse(outcome.out).at("peak_resident_bytes"), 64 << 20);
 }
 
 TEST_F(Bucket, AFailureLeavesNothingThatCanBeRead) {

@@ -20,7 +20,8 @@ Prints its port. The first part of a path names what is wrong with it:
     /bucket-FAULT/…     … where writing fails: "busy" (each first try of it gets 503), "reset" (or
                         ends without a reply), "late" (an upload in parts is complete, but the first
                         reply is lost), "denied" (the second part gets 403), "false" (completing
-                        it fails with the status 200), "hang" (the second part gets no reply)
+                        it fails with the status 200), "hang" (the second part gets no reply),
+                        "slow" (a pause before each reply)
 
 GET /requests returns how many there were, and how many bytes were sent; GET /reset sets both to 0.
 GET /uploads returns how many uploads in parts are not complete, and how many were.
@@ -185,6 +186,8 @@ class Server:
             return False
         if mode == "bucket-denied" and query.get("partNumber") == "2":
             return await self.send(writer, 403, b"<Error><Code>AccessDenied</Code></Error>")
+        if mode == "bucket-slow":
+            await asyncio.sleep(0.2)
         if mode == "bucket-hang" and query.get("partNumber") == "2":
             await asyncio.sleep(3600)
         if upload is not None and upload not in self.uploads:

@@ -254,6 +254,10 @@ TEST_F(RangeCacheTest, BytesAreRequestedOnce) {
     EXPECT_EQ(storage->open("none"), nullptr);
   }
   EXPECT_GT(requests(), 5u);
+  int unchanged = 0;
+  client_->change = [&](const HttpRequest&, const HttpReply& reply) {
+    unchanged += reply.status == 304;
+  };
   const auto storage = open();
   const auto large = storage->open("large");
   large->will_need(3 * kMiB, 5000);
@@ -263,6 +267,8 @@ TEST_F(RangeCacheTest, BytesAreRequestedOnce) {
   EXPECT_EQ(read(*storage->open("small"), 0, 100), noise(100));
   EXPECT_EQ(storage->open("none"), nullptr);
   EXPECT_EQ(requests(), 3u);  // one of each object, whether it is still the same
+  EXPECT_EQ(unchanged, 2);
+  client_->change = {};
   // What is missing between two ranges, and no more.
   EXPECT_EQ(read(*large, 3 * kMiB, 4 * kMiB), part(3 * kMiB, 4 * kMiB));
   std::uint64_t bytes = 0;
