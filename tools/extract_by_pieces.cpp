@@ -8,6 +8,7 @@
 #include "core/stopwatch.h"
 #include "io/bytes/output_guard.h"
 #include "pipeline/pieces/piece_maker.h"
+#include "ranks/share_plans.h"
 #include "ranks/write_ply.h"
 #include "tools/extract_part.h"
 #include "tools/interrupt.h"
@@ -295,7 +296,10 @@ CommandOutput make_by_pieces(const ExtractArguments& arguments,
       ExtractOptions options = surface.options;
       options.memory -= memory;
       options.memory_of_others += memory;
-      const PieceMaker maker(store, options, count_parts(store, options, job));
+      const auto plan = [&] {
+        return PieceMaker::plan(store, options, count_parts(store, options, job));
+      };
+      const PieceMaker maker(store, options, job != nullptr ? share_plans(*job, plan) : plan());
       PieceWork work(surface, maker, job, console);
       pieces = spools ? work.in_memory(memory) : work.in_files();
       made = put_together(arguments, surface, maker, pieces, job, console);

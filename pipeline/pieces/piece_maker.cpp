@@ -86,13 +86,17 @@ std::optional<PieceEnd> find_piece(const std::filesystem::path& path, const std:
 
 }  // namespace
 
-PieceMaker::PieceMaker(const StoreReader& store, const ExtractOptions& options, std::uint32_t parts)
-    : store_(store), options_(options) {
+PartPlans PieceMaker::plan(const StoreReader& store, const ExtractOptions& options,
+                           std::uint32_t parts) {
   check_part({1, parts});
+  return plan_parts(store, check_request(store, options, Indexing::welded), options.level, parts);
+}
+
+PieceMaker::PieceMaker(const StoreReader& store, const ExtractOptions& options, PartPlans plans)
+    : store_(store), options_(options), plans_(std::move(plans)) {
   if (options.backend == Backend::cuda)
     throw UsageError("parts of a mesh are made on the CPU: leave out --backend cuda");
   const ExtractRequest request = check_request(store, options, Indexing::welded);
-  plans_ = plan_parts(store, request, options.level, parts);
   header_ = mesh_header(request.level->transform, request.level->lattice.extent,
                         request.surface.normals, plans_.bounds);
   mesh_ = mesh_json(store, request, options.level);
@@ -135,7 +139,8 @@ PieceReport extract_piece(const StoreReader& store, const ExtractOptions& option
   if (path.native() == kStandardOutput)
     throw UsageError(
         "a piece has a name, by which it is found again: it cannot go to standard output");
-  return PieceMaker(store, options, part.count).make(part.number, path, force, progress);
+  const PieceMaker maker(store, options, PieceMaker::plan(store, options, part.count));
+  return maker.make(part.number, path, force, progress);
 }
 
 }  // namespace isobrick

@@ -16,8 +16,12 @@ namespace isobrick::inline v0 {
 /// Makes pieces of one mesh: what extract_piece() does, with one plan for all of them.
 class PieceMaker {
  public:
-  /// The store must outlive it. Throws as extract_piece() does.
-  PieceMaker(const StoreReader& store, const ExtractOptions& options, std::uint32_t parts);
+  /// Plans so many parts, which reads the ranges of the whole volume. Throws as extract_piece()
+  /// does.
+  static PartPlans plan(const StoreReader& store, const ExtractOptions& options,
+                        std::uint32_t parts);
+  /// By plan() of the same surface. The store must outlive it. Throws as extract_piece() does.
+  PieceMaker(const StoreReader& store, const ExtractOptions& options, PartPlans plans);
 
   const PartPlans& parts() const { return plans_; }
   /// Of the whole mesh.

@@ -3,6 +3,7 @@
 #include <isobrick/mesh_file_sink.h>
 #include "pipeline/pieces/piece_maker.h"
 #include "pipeline/pieces/piece_reader.h"
+#include "ranks/share_plans.h"
 #include "ranks/write_ply.h"
 #include "tests/pipeline/pieces_fixture.h"
 #include "tests/ranks/thread_ranks.h"
@@ -21,6 +22,12 @@ class WritePly : public Pieces {
     const auto sink = create_mesh_file(path, {});
     extract(store, options, *sink);
     return content_of_piece(path);
+  }
+
+  /// Of three parts.
+  static PieceMaker maker_of(const StoreReader& store, double isovalue) {
+    const ExtractOptions options{.isovalue = isovalue};
+    return {store, options, PieceMaker::plan(store, options, 3)};
   }
 
   fs::path path_of(std::uint32_t number) {
@@ -51,7 +58,9 @@ class WritePly : public Pieces {
     options.threads = 1;
     const fs::path path = folder_ / "ranks.ply";
     run_job(ranks, [&](Ranks& job) {
-      const PieceMaker maker(store, options, parts);
+      const PieceMaker maker(store, options, share_plans(job, [&] {
+                               return PieceMaker::plan(store, options, parts);
+                             }));
       write_ply(job, maker.parts(), make(job, maker, in_memory), maker.header(), path, true,
                 no_progress());
     });
@@ -88,7 +97,7 @@ TEST_F(WritePly, ExchangesBordersOnly) {
   constexpr std::uint32_t kParts = 12;
   std::atomic<std::uint64_t> received = 0, bound = 0;
   run_job(4, [&](Ranks& job) {
-    const PieceMaker maker(reader, options, kParts);
+    const PieceMaker maker(reader, options, PieceMaker::plan(reader, options, kParts));
     const std::vector<OwnPiece> own = make(job, maker);
     const std::uint64_t before = job.bytes_received();
     find_places(job, maker.parts(), own);
@@ -106,8 +115,8 @@ TEST_F(WritePly, RefusesPiecesThatDoNotFit) {
   const StoreReader other = store(busy_field<std::uint16_t>({130, 97, 80}));
   const fs::path path = folder_ / "ranks.ply";
   run_job(1, [&](Ranks& job) {
-    const PieceMaker maker(reader, {.isovalue = 50}, 3);
-    const PieceMaker stranger(other, {.isovalue = 60}, 3);
+    const PieceMaker maker = maker_of(reader, 50);
+    const PieceMaker stranger = maker_of(other, 60);
     std::vector<OwnPiece> own = make(job, maker);
     stranger.make(2, path_of(2), true, no_progress());
     own[1].bytes = open_piece_file(path_of(2));
@@ -125,7 +134,7 @@ TEST_F(WritePly, LeavesNothingOfADamagedPiece) {
   const StoreReader reader = store(busy_field<std::uint8_t>({130, 97, 60}));
   const fs::path path = folder_ / "ranks.ply";
   run_job(1, [&](Ranks& job) {
-    const PieceMaker maker(reader, {.isovalue = 50}, 3);
+    const PieceMaker maker = maker_of(reader, 50);
     const std::vector<OwnPiece> own = make(job, maker);
     std::string bytes = content_of_piece(path_of(3));
     bytes[bytes.size() / 2] ^= 1;
