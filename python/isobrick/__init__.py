@@ -27,6 +27,7 @@ from ._mesh import Measure, Mesh
 from ._open import open
 from ._operations import convert, export, index, info, recode, synth, verify
 from ._picture import Picture, render
+from ._pieces import merge
 from ._volume import Histogram, Level, Volume
 
 __all__ = [
@@ -52,6 +53,7 @@ __all__ = [
     "index",
     "info",
     "marching_cubes",
+    "merge",
     "open",
     "recode",
     "render",

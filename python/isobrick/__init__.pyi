@@ -517,6 +517,24 @@ class Volume:
         force: bool = False,
         quantize: bool = False,
     ) -> dict[str, Any]: ...
+    def extract_piece(
+        self,
+        isovalue: _Isovalue,
+        path: _Path,
+        part: tuple[int, int],
+        *,
+        level: int = 0,
+        roi: _Roi = None,
+        normals: bool = False,
+        inside: Optional[_Inside] = None,
+        drop_degenerate: bool = False,
+        topology: _Topology = "consistent",
+        cap: bool = False,
+        memory: _Bytes = ...,
+        threads: int = 0,
+        progress: _Progress = None,
+        force: bool = False,
+    ) -> dict[str, Any]: ...
     def estimate(
         self, isovalue: _Isovalue, *, level: int = 0, roi: _Roi = None
     ) -> dict[str, Any]: ...
@@ -587,6 +605,46 @@ def open(
 ) -> Volume: ...
 def convert(
     source: Any, path: _Path, *, progress: _Progress = None, **options: Any
+) -> dict[str, Any]: ...
+@overload
+def merge(
+    pieces: Sequence[_Path],
+    path: None = None,
+    *,
+    min_component: int = 0,
+    largest: int = 0,
+    smooth: int = 0,
+    pass_band: float = 0.1,
+    simplify: Optional[float] = None,
+    max_error: Optional[float] = None,
+    measure: bool = False,
+    memory: _Bytes = ...,
+    threads: int = 0,
+    progress: _Progress = None,
+    force: bool = False,
+    quantize: bool = False,
+    levels: Optional[int] = None,
+    sharded: bool = False,
+) -> Mesh: ...
+@overload
+def merge(
+    pieces: Sequence[_Path],
+    path: _Path,
+    *,
+    min_component: int = 0,
+    largest: int = 0,
+    smooth: int = 0,
+    pass_band: float = 0.1,
+    simplify: Optional[float] = None,
+    max_error: Optional[float] = None,
+    measure: bool = False,
+    memory: _Bytes = ...,
+    threads: int = 0,
+    progress: _Progress = None,
+    force: bool = False,
+    quantize: bool = False,
+    levels: Optional[int] = None,
+    sharded: bool = False,
 ) -> dict[str, Any]: ...
 def recode(
     source: _Path,

@@ -298,6 +298,25 @@ def convert_function(
 def recode(
     path: str, out: str, options: ConvertOptions, report: Report
 ) -> dict[str, Any]: ...
+def extract_piece(
+    volume: Store,
+    options: ExtractOptions,
+    number: int,
+    count: int,
+    path: str,
+    force: bool,
+    report: Report,
+) -> dict[str, Any]: ...
+def merge_mesh(
+    pieces: list[str], filters: MeshFilterOptions, memory: int, report: Report
+) -> Mesh: ...
+def merge_to_file(
+    pieces: list[str],
+    filters: MeshFilterOptions,
+    path: str,
+    file: MeshFileOptions,
+    report: Report,
+) -> dict[str, Any]: ...
 def index(
     path: str,
     kind: str,

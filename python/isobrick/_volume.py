@@ -14,6 +14,7 @@ from ._device import DeviceMesh, DeviceVolume, stream_number
 from ._errors import UsageError
 from ._indexing import read_indexed
 from ._mesh import Mesh, meshes_of, with_measure
+from ._pieces import part_numbers
 from ._progress import reporting
 
 
@@ -365,6 +366,40 @@ class Volume:
         with reporting(progress) as report:
             return with_measure(
                 self._native.save_mesh(options, filters, path_text(path), file, report)
+            )
+
+    def extract_piece(
+        self, isovalue, path, part, *, level=0, roi=None, normals=False, inside=None,
+        drop_degenerate=False, topology="consistent", cap=False, memory=2**30, threads=0,
+        progress=None, force=False,
+    ):
+        """One part of a surface, as a file that `isobrick.merge` puts together with the others.
+
+        Tasks on many machines may each make a part; they need to know nothing of each other.
+
+        Parameters
+        ----------
+        isovalue, level, roi, normals, inside, drop_degenerate, topology, cap
+            As of `extract`, the same for all parts.
+        path : str or path
+            The piece, such as "ct_3of8.piece". One that is there, whole and the same, is kept.
+        part : (int, int)
+            Which part of how many: (3, 8) is the third of eight.
+        memory, threads, progress
+            As of `extract`.
+        force : bool
+            Replaces a file that is no piece.
+
+        Made on the CPU. Returns a dictionary: vertices, faces, bytes, and whether it was kept.
+        """
+        options = self._surface(
+            isovalue, progress=progress, level=level, roi=roi, normals=normals, inside=inside,
+            drop_degenerate=drop_degenerate, topology=topology, cap=cap, memory=memory,
+            threads=threads,
+        )
+        with reporting(progress) as report:
+            return _isobrick.extract_piece(
+                self._native, options, *part_numbers(part), path_text(path), bool(force), report
             )
 
     def estimate(self, isovalue, *, level=0, roi=None):

@@ -12,6 +12,7 @@ void bind_device(pybind11::module_& module);
 void bind_extractor(pybind11::module_& module);
 void bind_store(pybind11::module_& module);
 void bind_operations(pybind11::module_& module);
+void bind_pieces(pybind11::module_& module);
 void bind_skimage(pybind11::module_& module);
 
 }  // namespace isobrick::python

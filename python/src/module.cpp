@@ -13,5 +13,6 @@ PYBIND11_MODULE(_isobrick, module) {
   bind_extractor(module);
   bind_store(module);
   bind_operations(module);
+  bind_pieces(module);
   bind_skimage(module);
 }
