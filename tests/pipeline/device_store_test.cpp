@@ -18,6 +18,14 @@
 namespace isobrick::test {
 namespace {
 
+bool has_device() {
+#ifdef ISOBRICK_WITH_CUDA
+  return gpu::device_available();
+#else
+  return false;
+#endif
+}
+
 isobrick::Mesh on_cpu(const StoreReader& store, ExtractOptions options) {
   options.backend = Backend::cpu;
   options.gpu_memory = 0;
@@ -28,7 +36,7 @@ isobrick::Mesh on_cpu(const StoreReader& store, ExtractOptions options) {
 class DeviceStore : public ::testing::Test {
  protected:
   void SetUp() override {
-    if (!gpu::device_available()) GTEST_SKIP() << "no CUDA device";
+    if (!has_device()) GTEST_SKIP() << "no CUDA device";
   }
 
   template <class T>
@@ -206,7 +214,7 @@ TEST_F(DeviceStore, DamagedBricksAreNamed) {
 }
 
 TEST(WithoutADevice, AStoreIsRefused) {
-  if (gpu::device_available()) GTEST_SKIP() << "there is one";
+  if (has_device()) GTEST_SKIP() << "there is one";
   TemporaryFolder folder;
   MemorySource source = make_source<std::uint8_t>({20, 20, 20}, 3);
   convert_quietly(source, folder / "store", {.threads = 1});
