@@ -9,6 +9,7 @@
 #include "bricks/store_writer.h"
 #include "core/cancellable_progress.h"
 #include "core/stopwatch.h"
+#include "io/bytes/output_guard.h"
 #include "pipeline/check_part.h"
 #include "pipeline/convert/codec_choice.h"
 #include "pipeline/convert/convert_cascade.h"
@@ -243,9 +244,12 @@ ConvertReport convert(VolumeSource& source, const std::filesystem::path& out,
   Stopwatch watch;
   const bool choose = has_choice(options);
   StoreLayout layout = plan_layout(source.info(), options, source.sparse());
+  std::vector<std::filesystem::path> inputs = options.inputs;
+  inputs.insert(inputs.end(), source.info().files.begin(), source.info().files.end());
   if (options.part) {
     check_part(*options.part);
     check_part_output(out, options);
+    check_replaces_no_input(out, inputs);
     ConvertReport report = convert_part(source, layout, out, options, progress);
     report.codec = layout.codecs().name();
     report.seconds = watch.lap();
@@ -267,8 +271,6 @@ ConvertReport convert(VolumeSource& source, const std::filesystem::path& out,
         source.memory() + (choose ? sampling_bytes(finest, layout.zstd_level, samplers) : 0),
         index_memory);
   if (options.index) check_index_options(index_options(options, false), finest);
-  std::vector<std::filesystem::path> inputs = options.inputs;
-  inputs.insert(inputs.end(), source.info().files.begin(), source.info().files.end());
   std::optional<JoinedParts> joined;
   if (options.join > 0) joined.emplace(layout, out, options.join);
   // What an interrupted join has moved is not in the parts any more.

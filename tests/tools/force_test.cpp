@@ -85,6 +85,8 @@ TEST_F(Force, KeepsFoldersOfOtherPrograms) {
 
 TEST_F(Force, KeepsTheInputOfAConversion) {
   const std::string store = make_store("a");
+  expect_kept({"convert", store, store, "--force", "--part", "1/2"}, {"a.zarr", "it is the input"});
+  EXPECT_FALSE(fs::exists(store + ".parts"));
   expect_kept({"convert", store, store, "--force"}, {"a.zarr", "it is the input"});
   expect_kept({"convert", store + "/0", store, "--force"}, {"a.zarr", "lies in it"});
   fs::create_symlink(store, path("link"));
