@@ -1,4 +1,5 @@
 #include <filesystem>
+#include <regex>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -217,12 +218,18 @@ class PieceWork {
   MadePieces made_;
 };
 
+/// Whether a file is named as ours are, "3of8.piece": also one of an earlier run with other parts.
+bool is_own_piece(const fs::path& path) {
+  static const std::regex name("[0-9]+of[0-9]+\\.piece");
+  return std::regex_match(path.filename().string(), name);
+}
+
 /// The folder goes if nobody put anything else into it.
 void remove_pieces(const MadePieces& pieces) {
   if (pieces.folder.empty()) return;
   std::error_code ignored;
   for (const auto& entry : fs::directory_iterator(pieces.folder, ignored))
-    if (entry.path().extension() == kPieceExtension) fs::remove(entry.path(), ignored);
+    if (is_own_piece(entry.path())) fs::remove(entry.path(), ignored);
   fs::remove(pieces.folder, ignored);
 }
 

@@ -264,9 +264,12 @@ TEST_F(Parts, ResumeAnExtraction) {
 
 TEST_F(Parts, ResumeLeavesOtherFilesInItsFolder) {
   fs::create_directory(path("r.ply.pieces"));
-  write_file(path("r.ply.pieces/notes.txt"), "mine");
+  for (const char* name : {"notes.txt", "a.piece", "3of8.piece"})
+    write_file(path("r.ply.pieces") + "/" + name, "mine");
   run_json(extract({"-o", path("r.ply"), "--resume"}));
   EXPECT_EQ(read_file(path("r.ply.pieces/notes.txt")), "mine");
+  EXPECT_EQ(read_file(path("r.ply.pieces/a.piece")), "mine");
+  EXPECT_FALSE(fs::exists(path("r.ply.pieces/3of8.piece"))) << "of other parts, by its name";
   expect_refused(run(extract({"-o", "-", "--resume"})), 2, {"--resume", "-o"});
   expect_refused(run(extract({"-o", path("p.ply"), "--resume", "--preview", path("p.png")})), 2,
                  {"--resume", "--preview"});
