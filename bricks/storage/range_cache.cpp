@@ -137,6 +137,7 @@ RangeCache::RangeCache(const fs::path& cache, std::uint64_t limit, Note on_note)
     give_up(folder_.string(), failure ? failure.value() : errno);
     return;
   }
+  const FileLock held(total_.get());
   make_room(0);  // the limit may be smaller than that of the last process
 }
 
@@ -184,26 +185,44 @@ std::uint64_t RangeCache::last_change(const fs::path& root_folder) const {
   return known ? known->root : 0;
 }
 
+/// Opens a temporary file that has its size at once, so that whoever counts the files knows of it.
+/// No file, and errno, where it cannot be made; errno 0 where there is no room.
+UniqueFd RangeCache::open_temporary(const fs::path& file, std::uint64_t size) {
+  const std::lock_guard lock(mutex_);
+  errno = 0;
+  if (!is_writable_ || disk_bytes(size) > limit_) return {};
+  const FileLock held(total_.get());
+  if (!make_room(disk_bytes(size))) {
+    errno = 0;
+    return {};
+  }
+  UniqueFd fd;
+  // Another process may remove an empty folder.
+  for (int tries = 0; fd.get() < 0 && tries < 3; ++tries) {
+    ::mkdir(file.parent_path().c_str(), 0777);
+    fd = UniqueFd(::open(file.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666));
+  }
+  if (fd.get() < 0 || ::ftruncate(fd.get(), static_cast<off_t>(size)) == 0) return fd;
+  const int why = errno;
+  ::unlink(file.c_str());
+  errno = why;
+  return {};
+}
+
 bool RangeCache::write(const fs::path& file,
                        std::initializer_list<std::span<const std::byte>> parts) {
   static std::atomic<std::uint64_t> count = 0;
   std::uint64_t size = 0;
   for (const auto part : parts) size += part.size();
-  if (!make_room(disk_bytes(size))) return false;
   const fs::path temporary =
       file.parent_path() / fmt::format("{}{}-{}", kTemporary, ::getpid(), count++);
-  int fd = -1;
-  // Another process may remove an empty folder.
-  for (int tries = 0; fd < 0 && tries < 3; ++tries) {
-    ::mkdir(file.parent_path().c_str(), 0777);
-    fd = ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
-  }
-  if (fd < 0) {
-    give_up(file.parent_path().string(), errno);
+  UniqueFd fd = open_temporary(temporary, size);
+  if (fd.get() < 0) {
+    if (errno != 0) give_up(file.parent_path().string(), errno);
     return false;
   }
-  int why = write_all(fd, parts);
-  if (::close(fd) != 0 && why == 0) why = errno;
+  int why = write_all(fd.get(), parts);
+  if (::close(fd.release()) != 0 && why == 0) why = errno;
   if (why == 0 && ::rename(temporary.c_str(), file.c_str()) != 0) why = errno;
   if (why == 0) return true;
   ::unlink(temporary.c_str());
@@ -223,43 +242,51 @@ void RangeCache::remove(const fs::path& file) {
 }
 
 /// Counts `bytes` more, and removes files where that is more than the limit. Whether there is room.
+/// The caller holds both locks.
 bool RangeCache::make_room(std::uint64_t bytes) {
-  const std::lock_guard lock(mutex_);
-  if (!is_writable_ || bytes > limit_) return false;
-  const FileLock held(total_.get());
   std::optional<std::uint64_t> total = read_total(total_.get());
   // More than needed, so that not every file that comes looks at all of them.
   if (!total || *total + bytes > limit_)
     total = shrink(std::min(limit_ - bytes, limit_ - limit_ / 8));
-  write_total(total_.get(), *total + bytes);
-  return true;
+  const bool has_room = *total + bytes <= limit_;
+  write_total(total_.get(), *total + (has_room ? bytes : 0));
+  return has_room;
 }
 
-/// Removes the files that were used longest ago. Returns the bytes of those that are left.
+/// Removes the files that were used longest ago, but none that are being written. Returns the bytes
+/// of those that are left.
 std::uint64_t RangeCache::shrink(std::uint64_t limit) const {
   timespec now{};
   ::clock_gettime(CLOCK_REALTIME, &now);
   const auto size_of = [](const struct stat& file) {
     return disk_bytes(static_cast<std::uint64_t>(file.st_size));
   };
+  const auto is_temporary = [](const fs::path& path) {
+    return path.filename().string().starts_with(kTemporary);
+  };
   AgeHistogram ages;
-  for_each_file(folder_, [&](const fs::path&, const struct stat& file) {
-    ages.add(age_ms(file, now), size_of(file));
+  std::uint64_t being_written = 0;
+  for_each_file(folder_, [&](const fs::path& path, const struct stat& file) {
+    const double age = age_ms(file, now);
+    if (is_temporary(path) && age <= kAbandonedMs)
+      being_written += size_of(file);
+    else
+      ages.add(age, size_of(file));
   });
+  limit -= std::min(limit, being_written);
   const std::size_t last = ages.first_to_go(limit);
   std::uint64_t left = ages.up_to(SIZE_MAX), younger = ages.up_to(last);
   for_each_file(folder_, [&](const fs::path& path, const struct stat& file) {
     const double age = age_ms(file, now);
     const std::size_t bin = AgeHistogram::bin(age);
-    const bool is_temporary = path.filename().string().starts_with(kTemporary);
     const bool goes =
-        is_temporary ? age > kAbandonedMs : bin > last || (bin == last && younger > limit);
+        is_temporary(path) ? age > kAbandonedMs : bin > last || (bin == last && younger > limit);
     if (!goes || ::unlink(path.c_str()) != 0) return;
     left -= std::min(left, size_of(file));
     if (bin == last) younger -= std::min(younger, size_of(file));
     ::rmdir(path.parent_path().c_str());  // where it is empty
   });
-  return left;
+  return left + being_written;
 }
 
 void RangeCache::give_up(const std::string& what, int why) {

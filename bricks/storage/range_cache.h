@@ -63,6 +63,7 @@ class RangeCache {
   void remove(const std::filesystem::path& file);
 
  private:
+  UniqueFd open_temporary(const std::filesystem::path& file, std::uint64_t size);
   bool make_room(std::uint64_t bytes);
   std::uint64_t shrink(std::uint64_t limit) const;
   void give_up(const std::string& what, int why);

@@ -208,6 +208,25 @@ TEST_F(RangeCacheTest, TheLimitHoldsForAllWhoWrite) {
   EXPECT_GT(bytes_on_disk(), kMiB / 2);
 }
 
+/// Files count that are still being written when others look for room.
+TEST_F(RangeCacheTest, WhatIsBeingWrittenCounts) {
+  const Bytes bytes = noise(2 * kMiB);
+  for (int round = 0; round < 10; ++round) {
+    const auto disk = cache(5 * kMiB);
+    std::vector<std::thread> threads;
+    for (int t = 0; t < 8; ++t)
+      threads.emplace_back([&, t] {
+        const fs::path folder = disk->folder_of(std::to_string(t));
+        for (int i = 0; i < 4; ++i)
+          disk->write(folder / std::to_string(4 * round + i), {std::span<const std::byte>(bytes)});
+      });
+    for (std::thread& thread : threads) thread.join();
+    ASSERT_LE(bytes_on_disk(), 5 * kMiB) << round;
+  }
+  EXPECT_GE(bytes_on_disk(), bytes.size());
+  EXPECT_TRUE(notes_.empty());
+}
+
 TEST_F(RangeCacheTest, FilesOfKilledProcessesGo) {
   cache()->put(folder_ / "remote" / "a", {});
   const fs::path old = folder_ / "remote" / "a" / "partial-1-1",
