@@ -56,9 +56,10 @@ inline std::uint32_t coincident_number(const CoincidentVertices& coincident, int
       .number;
 }
 
+/// Writes the triangles of cells with a coincident vertex.
 inline void write_kept_triangles(const CaseTables& tables, const TileState& tile, Triangle* out) {
   const CoincidentVertices& coincident = *tile.coincident;
-  for (const ActiveCell cell : tile.cells) {
+  for (const ActiveCell cell : coincident.cells) {
     const int x = static_cast<int>(cell & 31), y = static_cast<int>(cell >> 5 & 31),
               z = static_cast<int>(cell >> 10 & 31);
     const auto number = [&](int vertex) {

@@ -353,7 +353,8 @@ MeshSize CpuExtractor::max_in_cell(Topology topology) {
 std::uint64_t CpuExtractor::workspace_bytes(ScalarType type, bool drop_degenerate,
                                             Topology topology, const CapBounds& cap) {
   const std::uint64_t coincident =
-      sizeof(CoincidentVertices) + kTileRows * kTileSamples * sizeof(SampleVertex);
+      sizeof(CoincidentVertices) + kTileRows * kTileSamples * sizeof(SampleVertex) +
+      kTileVolume * sizeof(ActiveCell);
   // Its lists grow by halves.
   const std::uint64_t cap_bytes =
       cap.faces == 0

@@ -51,12 +51,12 @@ void Write(ScalarType type, const KernelContext& context, TileState& tile, Vec3f
   const CaseTables& tables = context.world.mirrored ? kMirroredCaseTables : kCaseTables;
   Triangle* const cap = triangles + (tile.triangles - tile.cap_triangles());
   Triangle* const patched = cap - tile.patched_triangles;
-  if (tile.coincident && tile.coincident->matter()) {
-    write_kept_triangles(tables, tile, triangles);
+  write_triangles(tables, tile, triangles);
+  if (tile.coincident) {
+    write_kept_triangles(tables, tile, patched - tile.coincident->triangles);
     write_kept_patched_triangles(context.world.mirrored, tile, patched);
-  } else {
-    write_triangles(tables, tile, triangles);
-    if (tile.patched.size() > 0) write_patched_triangles(context.world.mirrored, tile, patched);
+  } else if (tile.patched.size() > 0) {
+    write_patched_triangles(context.world.mirrored, tile, patched);
   }
   if (tile.cap_triangles() > 0) write_cap_triangles(context, tile, cap);
 }

@@ -97,19 +97,20 @@ struct SampleVertex {
 struct CoincidentVertices {
   /// Bit x: sample x is a coincident vertex. A row and a sample more than there are, always 0.
   std::uint64_t at[kTileRows + kTileSamples + 1] = {};
-  std::uint64_t used[kTileRows];       ///< bit x: a triangle of this tile has a corner on sample x
-  std::uint32_t first[kTileRows];      ///< which of `vertices` is the row's first
-  PodBuffer<SampleVertex> vertices;    ///< the used ones, by place
-  std::uint32_t own = 0;               ///< of them made by this tile
-  std::uint32_t left_out = 0;          ///< triangles
+  std::uint64_t used[kTileRows];     ///< bit x: a triangle of this tile has a corner on sample x
+  std::uint32_t first[kTileRows];    ///< which of `vertices` is the row's first
+  PodBuffer<SampleVertex> vertices;  ///< the used ones, by place
+  PodBuffer<ActiveCell> cells;       ///< with a coincident vertex; they are not in TileState::cells
+  std::uint32_t triangles = 0;       ///< of these cells that are kept
+  std::uint32_t own = 0;             ///< of the vertices made by this tile
+  std::uint32_t left_out = 0;        ///< triangles
   std::uint32_t patched_left_out = 0;  ///< of them those of patched cells
 
   void clear() {
     vertices.clear();
-    own = left_out = patched_left_out = 0;
+    cells.clear();
+    triangles = own = left_out = patched_left_out = 0;
   }
-  /// Whether a triangle has a corner on a coincident vertex, or had before it was left out.
-  bool matter() const { return vertices.size() > 0 || left_out > 0; }
 };
 
 /// The cells around a tile that exist, as rows of bits: row (y, z) and bit x + 1 for cell
