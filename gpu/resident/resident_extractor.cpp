@@ -97,7 +97,7 @@ struct ResidentExtractor::Impl {
   }
 
   void make_row_tables(std::uint32_t tiles) {
-    const std::uint64_t more = (tiles - launcher.tiles_with_room()) * sizeof(RowTable);
+    const std::uint64_t more = launcher.bytes_of_row_tables(tiles);
     if (bytes() + more > max_bytes) allocate({});
     if (bytes() + more > max_bytes)
       throw OutOfDeviceMemory("the row tables do not fit the device beside the volume");
@@ -120,6 +120,7 @@ struct ResidentExtractor::Impl {
     is_launched = false;
     report.vertices = made.vertices;
     report.triangles = made.triangles;
+    report.degenerate_triangles = made.degenerate_triangles;
     report.kernel = {since_begin.lap(), made.active_tiles * tile_bytes +
                                             mesh_bytes({made.vertices, made.triangles}, normals())};
     return made;

@@ -68,6 +68,7 @@ struct ResidentLauncher::Counters {
   unsigned long long number_start, number_end;
   // From here on, with the sums of the search behind it, zeroed by the end of each launch.
   alignas(8) std::uint32_t search_ticket, extract_ticket, done, unused;
+  unsigned long long left_out;
 };
 
 ResidentLauncher::ResidentLauncher(DeviceVolume::Impl& volume, const SurfaceOptions& options,
@@ -75,7 +76,7 @@ ResidentLauncher::ResidentLauncher(DeviceVolume::Impl& volume, const SurfaceOpti
     : volume_(volume),
       options_(checked(options, volume.lattice)),
       tuning_(tuning),
-      shapes_(launch_shapes(kernel_of(volume.lattice.type, options))),
+      shapes_(launch_shapes(kernel_without(false))),
       cases_(1, volume.stream),
       items_(volume.tile_count, volume.stream),
       slot_of_tile_(volume.grid_tiles(), volume.stream),
@@ -89,7 +90,20 @@ ResidentLauncher::ResidentLauncher(DeviceVolume::Impl& volume, const SurfaceOpti
   // Tiles that are not searched are never active.
   static_assert(kNone == 0xffffffffu);
   check(cudaMemsetAsync(slot_of_tile_.data(), 0xff, slot_of_tile_.bytes(), stream));
+  if (options_.drop_degenerate) {
+    coincident_shapes_ = launch_shapes(kernel_without(true));
+    const int blocks = coincident_shapes_->shapes[0].blocks;
+    work_ = DeviceBuffer<CoincidentWork>(
+        std::min(volume.tile_count, static_cast<std::uint32_t>(blocks)), volume.stream);
+  }
   make_row_tables(std::min(volume.tile_count, kFirstRowTables));
+}
+
+/// The kernel that makes the surface, with degenerate triangles or without.
+TileKernel ResidentLauncher::kernel_without(bool degenerate) const {
+  TileKernel kernel = kernel_of(volume_.lattice.type, options_);
+  kernel.drop_degenerate = degenerate;
+  return kernel;
 }
 
 ResidentLauncher::~ResidentLauncher() {
@@ -113,6 +127,10 @@ void ResidentLauncher::make_row_tables(std::uint32_t count) {
   row_tables_ = {};
   row_tables_ = DeviceBuffer<RowTable>(count, volume_.stream);
   check(cudaMemsetAsync(row_tables_.data(), 0, row_tables_.bytes(), volume_.stream.get()));
+  if (options_.drop_degenerate) {
+    sample_tables_ = {};
+    sample_tables_ = DeviceBuffer<SampleTable>(count, volume_.stream);
+  }
   epoch_ = 0;
 }
 
@@ -181,16 +199,19 @@ void ResidentLauncher::launch_tiles(double isovalue, const MeshRoom& room,
   p.vertex_capacity = room.positions.size();
   p.triangle_capacity = room.triangles.size();
   p.end = launch_end();
-  const LaunchShape shape = shape_for(last);
+  p.coincident = {work_.data(), sample_tables_.data(), nullptr, &counters()->left_out};
+  const LaunchShape shape = shape_for(isovalue, last);
   shape.launch(shape, p, cases_.data(), volume_.stream.get());
   ++launches_;  // only now: the sums of one that could not be launched are those of the next
 }
 
 /// There will be about as many active tiles as last time.
-LaunchShape ResidentLauncher::shape_for(const DeviceCounts& last) const {
+LaunchShape ResidentLauncher::shape_for(double isovalue, const DeviceCounts& last) const {
   // A cell has two triangles, give or take.
   const std::uint64_t cells = last.triangles / 2 / std::max(last.active_tiles, 1u);
-  LaunchShape shape = tuning_.shape ? *tuning_.shape : shapes_.of(last.active_tiles, cells);
+  const bool leaves_out = coincident_shapes_ && has_coincident(volume_.lattice.type, isovalue);
+  const LaunchShapes& shapes = leaves_out ? *coincident_shapes_ : shapes_;
+  LaunchShape shape = tuning_.shape ? *tuning_.shape : shapes.of(last.active_tiles, cells);
   shape.blocks = std::min(shape.blocks, static_cast<int>(volume_.tile_count));
   return shape;
 }
@@ -213,7 +234,8 @@ bool ResidentLauncher::read_report(DeviceCounts& counts, std::uint32_t& blocks) 
     words[i] = LaunchWord::value_of(words[i]);
   }
   counts = {words[LaunchReport::kVertices], words[LaunchReport::kTriangles],
-            static_cast<std::uint32_t>(words[LaunchReport::kActiveTiles])};
+            static_cast<std::uint32_t>(words[LaunchReport::kActiveTiles]),
+            words[LaunchReport::kLeftOut]};
   blocks = static_cast<std::uint32_t>(words[LaunchReport::kBlocks]);
   return true;
 }
@@ -237,7 +259,8 @@ bool ResidentLauncher::is_reported() const {
 
 std::uint64_t ResidentLauncher::bytes() const {
   return cases_.bytes() + items_.bytes() + slot_of_tile_.bytes() + order_.bytes() + words_.bytes() +
-         row_tables_.bytes() + (volume_.array ? volume_.array->bytes() : 0);
+         row_tables_.bytes() + sample_tables_.bytes() + work_.bytes() +
+         (volume_.array ? volume_.array->bytes() : 0);
 }
 
 }  // namespace isobrick::gpu

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 
 #include <isobrick/surface_options.h>
 #include "gpu/resident/device_volume_impl.h"
@@ -35,6 +36,11 @@ class ResidentLauncher {
   /// Active tiles beyond this number are not begun.
   std::size_t tiles_with_room() const { return row_tables_.size(); }
   void make_row_tables(std::uint32_t count);
+  /// Bytes that make_row_tables() takes beyond what is held.
+  std::uint64_t bytes_of_row_tables(std::uint32_t count) const {
+    return (count - row_tables_.size()) *
+           (sizeof(RowTable) + (options_.drop_degenerate ? sizeof(SampleTable) : 0));
+  }
 
   /// Whether the last launch wanted more blocks of an array than there is room for, and so made
   /// nothing.
@@ -61,13 +67,16 @@ class ResidentLauncher {
   void launch_search(double isovalue);
   void launch_tiles(double isovalue, const MeshRoom& room, const DeviceCounts& last);
   LaunchEnd launch_end() const;
-  LaunchShape shape_for(const DeviceCounts& last) const;
+  TileKernel kernel_without(bool degenerate) const;
+  LaunchShape shape_for(double isovalue, const DeviceCounts& last) const;
   bool read_report(DeviceCounts& counts, std::uint32_t& blocks) const;
 
   DeviceVolume::Impl& volume_;
   SurfaceOptions options_;
   ResidentTuning tuning_;
   LaunchShapes shapes_;
+  /// Where degenerate triangles are left out, for isovalues that samples can equal.
+  std::optional<LaunchShapes> coincident_shapes_;
   std::uint32_t launches_ = 0, epoch_ = 0;
   std::uint32_t wanted_blocks_ = 0;  ///< of an array, by the last launch
   DeviceBuffer<CaseTable> cases_;
@@ -76,6 +85,8 @@ class ResidentLauncher {
   DeviceBuffer<OrderState> order_;
   DeviceBuffer<std::byte> words_;  ///< Counters, then the sums of the search
   DeviceBuffer<RowTable> row_tables_;
+  DeviceBuffer<SampleTable> sample_tables_;
+  DeviceBuffer<CoincidentWork> work_;
   std::shared_ptr<PinnedBuffer<LaunchReport>> report_;
 };
 

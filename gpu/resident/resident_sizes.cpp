@@ -19,7 +19,8 @@ constexpr std::uint64_t kSmallObjects = 64 << 10;
 
 }  // namespace
 
-ResidentSizes resident_sizes(const Lattice& lattice, const ResidentTiles& tiles, bool normals) {
+ResidentSizes resident_sizes(const Lattice& lattice, const ResidentTiles& tiles, bool normals,
+                             bool drop_degenerate) {
   const auto grid = static_cast<std::uint64_t>(volume(lattice.tiles()));
   ResidentSizes sizes;
   sizes.volume_bytes =
@@ -30,6 +31,10 @@ ResidentSizes resident_sizes(const Lattice& lattice, const ResidentTiles& tiles,
       std::max(tiles.active, std::min<std::uint64_t>(tiles.searched, kFirstRowTables));
   sizes.extractor_bytes =
       kSmallObjects + grid * sizeof(std::uint32_t) + row_tables * sizeof(RowTable) +
+      (drop_degenerate ? row_tables * sizeof(SampleTable) +
+                             std::min<std::uint64_t>(tiles.searched, kMaxCoincidentBlocks) *
+                                 sizeof(CoincidentWork)
+                       : 0) +
       tiles.searched * (sizeof(TileItem) + sizeof(OrderState)) +
       tiles.searched / kTilesOfSearchBlock * sizeof(unsigned long long) +
       mesh_bytes({tiles.active * kMeshOfTile.vertices, tiles.active * kMeshOfTile.triangles},

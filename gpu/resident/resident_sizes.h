@@ -18,7 +18,8 @@ struct ResidentTiles {
   std::uint64_t active = 0;                ///< at one isovalue
 };
 
-ResidentSizes resident_sizes(const Lattice& lattice, const ResidentTiles& tiles, bool normals);
+ResidentSizes resident_sizes(const Lattice& lattice, const ResidentTiles& tiles, bool normals,
+                             bool drop_degenerate = false);
 
 /// Row tables from the beginning, 4.4 MiB: with fewer active tiles the first isovalue needs no
 /// second launch.

@@ -18,6 +18,7 @@ namespace {
 SurfaceOptions checked(const Lattice& lattice, SurfaceOptions options) {
   check_supported(options);
   options.may_have_nan = options.may_have_nan && is_floating(lattice.type);
+  options.drop_degenerate = leaves_out_degenerate(lattice.type, options);
   if (std::isnan(options.isovalue)) throw UsageError("the isovalue is not a number");
   options.roi = intersect(options.roi, lattice.box());
   if (options.roi.empty()) throw UsageError("the region of interest holds no sample");
@@ -84,7 +85,11 @@ struct GpuExtractor::Impl {
   void link_all(InFlightLaunch& launch, std::span<const TileWork> tiles) {
     auto* items = reinterpret_cast<TileItem*>(launch.at(device.layout().items));
     auto* links = reinterpret_cast<TileLinks*>(launch.at(device.layout().links));
-    for (std::uint32_t i = 0; i < tiles.size(); ++i) items[i] = link(tiles[i], i, links[i]);
+    auto* neighbours = reinterpret_cast<TileNeighbours*>(launch.at(device.layout().neighbours));
+    for (std::uint32_t i = 0; i < tiles.size(); ++i) {
+      if (options.drop_degenerate) slots.find_around(tiles[i].tile, neighbours[i]);
+      items[i] = link(tiles[i], i, links[i]);
+    }
     if (welded()) slots.end_launch(tiles.back().tile, launch.unused_slots);
   }
 

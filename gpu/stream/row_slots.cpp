@@ -5,6 +5,7 @@
 
 #include <isobrick/error.h>
 #include "core/morton.h"
+#include "surface/sample_vertices.h"
 
 namespace isobrick::inline v0::gpu {
 namespace {
@@ -62,6 +63,14 @@ std::uint32_t RowSlots::find(Int3 tile) const {
   const Entry& entry = cube->entries[place_of(tile)];
   if (entry.slot == kNone) return kNone;
   return entry.slot | (entry.launch == launch_ ? TileLinks::kSameLaunch : 0);
+}
+
+void RowSlots::find_around(Int3 tile, TileNeighbours& around) const {
+  for (std::uint8_t n = 0; n < std::size(around.slots); ++n) {
+    const Int3 other = tile + offset_of(n);
+    const bool exists = min(other, Int3{0, 0, 0}) == Int3{0, 0, 0};
+    around.slots[n] = exists && other != tile ? find(other) : kNone;
+  }
 }
 
 void RowSlots::end_launch(Int3 last, std::vector<std::uint32_t>& unused) {

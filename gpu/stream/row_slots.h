@@ -25,6 +25,8 @@ class RowSlots {
   std::uint32_t add(Int3 tile);
   /// A tile's slot as TileLinks holds it, or kNone.
   std::uint32_t find(Int3 tile) const;
+  /// Those of the tiles around one; kNone for the tile itself and those beyond the grid.
+  void find_around(Int3 tile, TileNeighbours& around) const;
   /// Ends a launch whose last tile is `last`. Appends the slots that no later tile will
   /// ask for; they go back with recycle(), when the launch need not be repeated any more.
   void end_launch(Int3 last, std::vector<std::uint32_t>& unused);

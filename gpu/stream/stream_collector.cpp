@@ -131,8 +131,9 @@ std::optional<StreamCollector::Pending> StreamCollector::collect(InFlightLaunch&
     if (pending_) deliver(*pending_);
     pending_.reset();
     repeat_in_parts(launch);
-  } else if (size.vertices + size.triangles > 0) {
-    next = start_download(launch, size);
+  } else {
+    report_.degenerate_triangles += size.left_out;
+    if (size.vertices + size.triangles > 0) next = start_download(launch, size);
   }
   launch.samples.reset();
   release_launch(launch.count, size);
@@ -157,6 +158,7 @@ void StreamCollector::repeat_in_parts(InFlightLaunch& launch) {
     report_.gather.seconds += seconds_between(launch.unpack_begin, launch.unpacked);
     report_.kernel.seconds += seconds_between(launch.unpacked, launch.extracted);
     const SurfaceTotals size = launch.totals[0];
+    report_.degenerate_triangles += size.left_out;
     if (size.vertices + size.triangles > 0) deliver(start_download(launch, size));
     before = sums[end - 1];
     first = end;

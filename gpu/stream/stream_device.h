@@ -82,7 +82,7 @@ class StreamDevice {
   SurfaceOptions options_;
   BrickPool* pool_;
   StreamSizes sizes_;
-  StagingLayout layout_{0, 0};
+  StagingLayout layout_{0, 0, false};
   // Streams end before the memory that they work on.
   PinnedBuffer<std::byte> staging_;     ///< of all launches
   PinnedBuffer<SurfaceTotals> totals_;  ///< likewise

@@ -6,8 +6,9 @@
 #include "gpu/memory/arena.h"
 #include "gpu/tile/tile_params.h"
 
-// What the host sends for a launch, in one copy: the header, the items, their links,
-// their zeroed running totals, where the bricks of each lie. Bricks that are sent follow.
+// What the host sends for a launch, in one copy: the header, the items, their links and, where
+// degenerate triangles are left out, neighbours, their zeroed running totals, where the bricks of
+// each lie. Bricks that are sent follow.
 
 namespace isobrick::inline v0::gpu {
 
@@ -26,13 +27,14 @@ struct BrickBox {
 
 /// Where the parts of it begin, in bytes.
 struct StagingLayout {
-  std::size_t items, links, order, boxes, bricks, end;
+  std::size_t items, links, neighbours, order, boxes, bricks, end;
 
   /// A tile has at most `tile_bricks` bricks.
-  constexpr StagingLayout(std::size_t tiles, std::size_t tile_bricks)
+  constexpr StagingLayout(std::size_t tiles, std::size_t tile_bricks, bool drop_degenerate)
       : items(Arena::aligned(sizeof(LaunchHeader))),
         links(items + Arena::aligned(tiles * sizeof(TileItem))),
-        order(links + Arena::aligned(tiles * sizeof(TileLinks))),
+        neighbours(links + Arena::aligned(tiles * sizeof(TileLinks))),
+        order(neighbours + Arena::aligned(drop_degenerate ? tiles * sizeof(TileNeighbours) : 0)),
         boxes(order + Arena::aligned(tiles * sizeof(OrderState))),
         bricks(boxes + Arena::aligned(tiles * sizeof(BrickBox))),
         end(bricks + Arena::aligned(tiles * tile_bricks * sizeof(std::uint64_t))) {}

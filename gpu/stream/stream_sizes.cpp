@@ -10,6 +10,7 @@
 #include "gpu/stream/brick_pool.h"
 #include "gpu/stream/stream_layout.h"
 #include "gpu/tile/block_groups.h"
+#include "gpu/tile/supported.h"
 #include "surface/surface_extractor.h"
 
 namespace isobrick::inline v0::gpu {
@@ -87,12 +88,16 @@ StreamSizes stream_sizes(const Lattice& lattice, const SurfaceOptions& options, 
       slots_for(lattice, options.indexing == Indexing::welded, tiles, in_flight));
   s.tile_bricks = static_cast<std::uint32_t>(max_bricks_of_tile(lattice, sample_reach(options)));
   if (pool.bricks == 0) s.sent_bricks = static_cast<std::uint32_t>(bricks_to_send(lattice, tiles));
-  s.staging_bytes = StagingLayout(tiles, s.tile_bricks).end;
+  const bool leaves_out = leaves_out_degenerate(lattice.type, options);
+  s.staging_bytes = StagingLayout(tiles, s.tile_bricks, leaves_out).end;
+  if (leaves_out) s.coincident_blocks = std::min<std::uint32_t>(tiles, kMaxCoincidentBlocks);
   s.output_bytes = MeshArrays::bytes(s.vertices, s.triangles, options.normals);
   const std::uint64_t groups = (tiles + kTilesOfBlockGroup - 1) / kTilesOfBlockGroup;
   s.tile_block_bytes = groups * kBlockGroupSamples * lattice.sample_bytes();
   s.device_bytes =
-      kSmallBuffers + std::uint64_t{s.slots} * sizeof(RowTable) + s.tile_block_bytes +
+      kSmallBuffers + std::uint64_t{s.slots} * sizeof(RowTable) +
+      (leaves_out ? std::uint64_t{s.slots} * sizeof(SampleTable) : 0) +
+      s.coincident_blocks * sizeof(CoincidentWork) + s.tile_block_bytes +
       pool_device_bytes(lattice, pool) +
       in_flight_count * (s.staging_bytes + s.sent_bricks * lattice.brick_bytes() + s.output_bytes);
   s.pinned_bytes = kSmallBuffers + in_flight_count * s.staging_bytes + kOutputs * s.output_bytes +

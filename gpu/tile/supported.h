@@ -4,18 +4,23 @@
 #include <string>
 
 #include <isobrick/error.h>
+#include <isobrick/scalar.h>
 #include <isobrick/surface_options.h>
+#include "surface/coincident_vertices.h"
 
 namespace isobrick::inline v0::gpu {
 
 /// Why the kernels cannot make such a surface, in a line; nothing when they can.
 inline std::optional<std::string> why_unsupported(const SurfaceOptions& options) {
-  if (options.drop_degenerate)
-    return "degenerate triangles cannot be left out on a GPU; use --backend cpu";
   if (options.topology == Topology::trilinear)
     return "the topology of the trilinear interpolant has no kernels; use --backend cpu";
   if (options.cap) return "capped surfaces have no kernels; use --backend cpu";
   return std::nullopt;
+}
+
+/// Whether there may be degenerate triangles to leave out.
+inline bool leaves_out_degenerate(ScalarType type, const SurfaceOptions& options) {
+  return options.drop_degenerate && has_coincident(type, options.isovalue);
 }
 
 /// Throws UsageError with that line.

@@ -23,7 +23,10 @@ LaunchShape nan_shape(bool normals) {
 
 LaunchShapes launch_shapes(const TileKernel& kernel) {
   LaunchShapes shapes;
-  if (kernel.may_have_nan)
+  if (kernel.drop_degenerate)
+    shapes.shapes[0] = shapes.shapes[1] = shapes.shapes[2] =
+        coincident_shape(kernel.type, kernel.normals);
+  else if (kernel.may_have_nan)
     shapes.shapes[0] = shapes.shapes[1] = shapes.shapes[2] = kernel.type == ScalarType::f64
                                                                  ? nan_shape<double>(kernel.normals)
                                                                  : nan_shape<float>(kernel.normals);

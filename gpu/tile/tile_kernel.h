@@ -13,9 +13,12 @@ struct TileKernel {
   ScalarType type;
   bool normals = false;
   bool may_have_nan = false;  ///< of f32 and f64 only
+  bool drop_degenerate = false;
 };
+/// If degenerate triangles are left out, this one is for isovalues that samples can equal.
 inline TileKernel kernel_of(ScalarType type, const SurfaceOptions& options) {
-  return {type, options.normals, options.may_have_nan && is_floating(type)};
+  return {type, options.normals, options.may_have_nan && is_floating(type),
+          options.drop_degenerate};
 }
 
 /// A kernel as it is launched: the number of its thread blocks that fill the device and their size.
@@ -38,6 +41,9 @@ struct LaunchShapes {
   /// would be listed in several rounds, which takes a third longer, larger blocks are better.
   const LaunchShape& of(std::uint32_t tiles, std::uint64_t cells = 0) const;
 };
+
+/// Of a kernel that leaves degenerate triangles out.
+LaunchShape coincident_shape(ScalarType type, bool normals);
 
 /// Throws Error where no kernel fits the device.
 LaunchShapes launch_shapes(const TileKernel& kernel);

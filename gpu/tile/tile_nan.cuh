@@ -11,43 +11,65 @@ namespace isobrick::inline v0::gpu {
 /// Which samples around a tile are not numbers or outside of the region of interest. Lies
 /// where the lists will be, until the rows are counted.
 struct NanRows {
-  static constexpr int kEdge = 35;  ///< samples −1 … 33
-  /// Bit x + 1 of row (y + 1) + kEdge · (z + 1).
-  unsigned long long rows[kEdge * kEdge];
+  /// Bit x + 1 of row (y + 1) + kEdgeAround · (z + 1).
+  unsigned long long rows[kRowsAround];
 
-  __device__ unsigned long long at(int y, int z) const { return rows[(z + 1) * kEdge + y + 1]; }
+  __device__ unsigned long long at(int y, int z) const {
+    return rows[(z + 1) * kEdgeAround + y + 1];
+  }
 };
 
 __device__ inline NanRows& nan_rows_of(TileShared& s) {
   return *reinterpret_cast<NanRows*>(&s + 1);
 }
 
-/// Beside classify_samples(): a row a warp.
-template <int N, class T>
-__device__ inline void find_nan(TileShared& s, const TileParams& p) {
-  constexpr int kEdge = NanRows::kEdge;
-  NanRows& nan = nan_rows_of(s);
+/// The samples of a row around a tile, as a warp has them: lane i has sample i, and the first three
+/// lanes those beside.
+template <class T>
+struct SamplesInRow {
+  bool exists, beside_exists;  ///< in the region of interest
+  T sample, beside;            ///< of those that exist
+
+  /// Bit x + 1: sample x exists and is what `is` asks for. Whole warps.
+  template <class Is>
+  __device__ unsigned long long bits(Is&& is) const {
+    const unsigned inner = __ballot_sync(kFullMask, exists && is(sample)),
+                   outer = __ballot_sync(kFullMask, beside_exists && is(beside));
+    return (outer & 1u) | static_cast<unsigned long long>(inner) << 1 |
+           static_cast<unsigned long long>(outer >> 1 & 3u) << 33;
+  }
+};
+
+/// Calls f(row, SamplesInRow) for the rows of samples −1 … 33, a row a warp.
+template <int N, class T, class F>
+__device__ inline void for_each_row_around(const TileShared& s, const TileParams& p, F&& f) {
   const auto lane = static_cast<int>(lane_id());
   const auto exists = [&](int axis, int at) {
     const int global = s.shape.origin[axis] + at;
     return global >= p.roi_lo[axis] && global < p.roi_hi[axis];
   };
-  const auto is_nan = [&](int x, int y, int z) {
-    const T v = __ldg(sample_at<T>(s, block_at(x, y, z), x + 32 * y + 1024 * z));
-    return v != v;
+  const auto load = [&](bool there, int x, int y, int z) {
+    return there ? __ldg(sample_at<T>(s, block_at(x, y, z), x + 32 * y + 1024 * z)) : T{};
   };
   const int beside = lane == 0 ? -1 : 31 + lane;  // lanes 0, 1, 2: the samples beside the 32
   const bool row_exists = exists(0, lane), beside_exists = lane < 3 && exists(0, beside);
-  for (auto row = static_cast<int>(warp_id()); row < kEdge * kEdge; row += BlockConfig<N>::kWarps) {
-    const int y = row % kEdge - 1, z = row / kEdge - 1;
+  for (auto row = static_cast<int>(warp_id()); row < kRowsAround; row += BlockConfig<N>::kWarps) {
+    const int y = row % kEdgeAround - 1, z = row / kEdgeAround - 1;
     const bool here = exists(1, y) && exists(2, z);
-    const unsigned inner = __ballot_sync(kFullMask, !(here && row_exists) || is_nan(lane, y, z));
-    const unsigned outer =
-        __ballot_sync(kFullMask, !(here && beside_exists) || is_nan(beside, y, z));
-    if (lane == 0)
-      nan.rows[row] = (outer & 1u) | static_cast<unsigned long long>(inner) << 1 |
-                      static_cast<unsigned long long>(outer >> 1 & 3u) << 33;
+    const bool in = here && row_exists, in_beside = here && beside_exists;
+    f(row,
+      SamplesInRow<T>{in, in_beside, load(in, lane, y, z), load(in_beside, beside, y, z)});
   }
+}
+
+/// Beside classify_samples().
+template <int N, class T>
+__device__ inline void find_nan(TileShared& s, const TileParams& p) {
+  NanRows& nan = nan_rows_of(s);
+  for_each_row_around<N, T>(s, p, [&](int row, const SamplesInRow<T>& samples) {
+    const unsigned long long numbers = samples.bits([](T v) { return v == v; });
+    if (lane_id() == 0) nan.rows[row] = ~numbers & ((1ull << kEdgeAround) - 1);
+  });
 }
 
 /// Leaves out what touches NaN of a row's edges and cells.

@@ -3,6 +3,7 @@
 #include <cstdint>
 
 #include <isobrick/mesh.h>
+#include "gpu/tile/coincident_params.h"
 #include "surface/cell_math.h"
 
 // What the host hands to the extraction kernel. Plain data, no CUDA header.
@@ -13,8 +14,6 @@ namespace isobrick::inline v0::gpu {
 inline constexpr std::uint32_t kTileBlockSamples = 32 * 32 * 32;
 /// Samples of its first column, x = 0.
 inline constexpr std::uint32_t kColumnSamples = 32 * 32;
-/// Rows (y, z) of the 33³ samples that the cells of a tile touch.
-inline constexpr int kRowsOfTile = 33 * 33;
 
 /// An active tile. `slot` is where it leaves its row table for later tiles.
 struct TileItem {
@@ -55,6 +54,7 @@ inline constexpr unsigned long long kOrderMask = (1ull << 62) - 1;
 
 struct SurfaceTotals {
   unsigned long long vertices, triangles;
+  unsigned long long left_out;  ///< degenerate triangles
 };
 
 /// A word of a report in host memory. Each carries the number of its launch, so no word has to be
@@ -76,9 +76,11 @@ static_assert(LaunchWord::is_about(LaunchWord::of(5, (1u << 24) + 1), (1u << 24)
 static_assert(!LaunchWord::is_about(LaunchWord::of(5, 1u << 24), (1u << 24) - 1));
 static_assert(LaunchWord::value_of(LaunchWord::of((1ull << 40) - 1, 77)) == (1ull << 40) - 1);
 
-/// What a launch reports: vertices and triangles made, active tiles, blocks that it wanted.
+/// What a launch reports: vertices and triangles made, active tiles, blocks that it wanted,
+/// degenerate triangles left out.
 struct LaunchReport {
-  static constexpr int kVertices = 0, kTriangles = 1, kActiveTiles = 2, kBlocks = 3, kWords = 4;
+  static constexpr int kVertices = 0, kTriangles = 1, kActiveTiles = 2, kBlocks = 3, kLeftOut = 4,
+                       kWords = 5;
   std::uint64_t words[kWords];
 };
 
@@ -131,7 +133,8 @@ struct TileParams {
   Vec3f* normals;
   Triangle* triangles;
   std::uint64_t vertex_capacity, triangle_capacity;
-  SurfaceTotals* totals;  ///< where there is no report
+  SurfaceTotals* totals;        ///< where there is no report
+  CoincidentParams coincident;  ///< of the kernels that leave degenerate triangles out
   LaunchEnd end;
 };
 

@@ -77,20 +77,20 @@ __device__ inline void report(const TileParams& p, int word, std::uint64_t value
 
 /// Where the tile's vertices go. One warp.
 __device__ inline void place_vertices(TileShared& s, const TileParams& p) {
-  const std::uint32_t item = s.item;
+  const std::uint32_t item = s.item, vertices = s.all_vertices + s.sample_vertices;
   const unsigned long long start = *p.number_start;
   const auto base =
       sum_before([&](std::uint32_t i) -> unsigned long long& { return p.order[i].vertices; }, item,
-                 s.all_vertices);
+                 vertices);
   if (lane_id() != 0) return;
   s.vertex_base = base;
   s.number_base = static_cast<std::uint32_t>(start + base);
   if (item + 1 < s.items) return;
   if (p.end.report)
-    report(p, LaunchReport::kVertices, base + s.all_vertices);
+    report(p, LaunchReport::kVertices, base + vertices);
   else
-    p.totals->vertices = base + s.all_vertices;
-  *p.number_end = start + base + s.all_vertices;
+    p.totals->vertices = base + vertices;
+  *p.number_end = start + base + vertices;
 }
 
 /// Where the tile's triangles go. One warp.

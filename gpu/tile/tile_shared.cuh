@@ -99,7 +99,8 @@ struct alignas(256) TileShared {
   std::uintptr_t columns[4];
   /// Of each plane's first 32 rows and of its last: vertices | cells << 16.
   std::uint32_t plane_sums[33], last_row_sums[33];
-  std::uint32_t all_vertices, all_cells;
+  std::uint32_t all_vertices, all_cells;  ///< on edges; that are listed
+  std::uint32_t sample_vertices;          ///< own coincident ones
   unsigned long long vertex_base, triangle_base;
   std::uint32_t number_base;        ///< mesh number of the tile's first vertex
   std::uint32_t neighbour_base[8];  ///< bit set: one tile lower along that axis

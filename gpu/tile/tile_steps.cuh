@@ -1,5 +1,6 @@
 #pragma once
 
+#include "gpu/tile/coincident_mesh.cuh"
 #include "gpu/tile/tile_barrier.cuh"
 #include "gpu/tile/tile_boundary.cuh"
 #include "gpu/tile/tile_count.cuh"
@@ -53,10 +54,11 @@ __device__ inline void classify_tile(TileShared& s, const TileParams& p,
 
 /// Counts a tile's active edges and active cells, and numbers its vertices. False where there
 /// are none; the last tile, which reports the totals, goes on.
-template <int N, bool Nan>
+template <int N, bool Nan, bool Coincident>
 __device__ inline bool count_tile(TileShared& s, const TileParams& p) {
   count_rows<N>(s, [&](int y, int z, RowEdges& edges) {
     if constexpr (Nan) leave_out_nan(nan_rows_of(s), y, z, edges);
+    if constexpr (Coincident) leave_out_coincident(coincident_work(p), y, z, edges);
   });
   __syncthreads();
   if constexpr (Nan) clear_lists<N>(s, ListsOf<N>::kListed, ListsOf<N>::kListed);
@@ -71,8 +73,10 @@ __device__ inline bool count_tile(TileShared& s, const TileParams& p) {
     s.next_cells = s.next_vertices = 0;
     s.all_vertices = vertices;
     s.all_cells = bases.cells;
+    s.sample_vertices = 0;
+    if constexpr (Coincident) s.sample_vertices = coincident_work(p).own;
     if (listed_at_once<N, Nan>(s)) s.barriers.turn ^= 1;
-    publish_sum(p.order[s.item].vertices, s.item, s.all_vertices);
+    publish_sum(p.order[s.item].vertices, s.item, s.all_vertices + s.sample_vertices);
   }
   if constexpr (Nan) __syncthreads();  // the lists are empty
   number_rows<N>(s, bases, p.row_tables[s.tile.slot]);
@@ -100,7 +104,7 @@ __device__ inline std::uint32_t list_cells_in_rounds(TileShared& s) {
 
 /// Lists the tile's cells and finds where its vertices and triangles go. Two warps wait for other
 /// tiles; the others wait for no more than the place of the vertices.
-template <int N, bool Nan>
+template <int N, bool Nan, bool Coincident>
 __device__ inline void place_tile(TileShared& s, const TileParams& p) {
   const std::uint32_t cells = s.all_cells;
   const bool at_once = listed_at_once<N, Nan>(s);
@@ -127,6 +131,7 @@ __device__ inline void place_tile(TileShared& s, const TileParams& p) {
   if (at_once && (for_vertices || for_triangles)) wait(s.barriers.cells, turn);
   if (for_triangles) {
     if (at_once) triangles = triangles_before<N>(s, (cells + 31) / 32);
+    if constexpr (Coincident) triangles += coincident_work(p).kept;
     if (lane_id() == 0) {
       s.all_triangles = triangles;
       publish_sum(p.order[s.item].triangles, s.item, triangles);
@@ -135,6 +140,7 @@ __device__ inline void place_tile(TileShared& s, const TileParams& p) {
   }
   if (for_vertices) {
     fetch_boundaries<N>(s, p, neighbour);
+    if constexpr (Coincident) fetch_owners(s, p);
     if (at_once) arrive(s.barriers.neighbours);
   } else if (at_once) {
     wait(s.barriers.vertex_base, turn);
@@ -145,7 +151,7 @@ template <int N, class T, bool Normals>
 __device__ inline void write_vertices(TileShared& s, const TileParams& p) {
   constexpr std::uint32_t kListed = ListsOf<N>::kListed;
   const std::uint32_t vertices = s.all_vertices;
-  if (s.vertex_base + vertices > p.vertex_capacity) return;
+  if (s.vertex_base + vertices + s.sample_vertices > p.vertex_capacity) return;
   for (std::uint32_t first = 0; first < vertices; first += kListed) {
     if (first > 0) mark_vertices<N>(s, first);
     write_listed_vertices<N, T, Normals>(s, p, first, ::min(vertices - first, kListed));
@@ -184,8 +190,8 @@ __device__ inline bool can_help(TileShared& s) {
 }
 
 /// Writes the mesh of a tile that has its place.
-template <int N, class T, bool Normals, bool Nan>
-__device__ inline void write_tile(TileShared& s, const TileParams& p) {
+template <int N, class T, bool Normals, bool Nan, bool Coincident>
+__device__ inline void write_tile(TileShared& s, const TileParams& p, T threshold) {
   const bool at_once = listed_at_once<N, Nan>(s);
   const bool has_waited = at_once && warp_id() == BlockConfig<N>::kVertices;
   // With normals vertices are most of the work, and all warps write them.
@@ -204,6 +210,7 @@ __device__ inline void write_tile(TileShared& s, const TileParams& p) {
   number_edges<N>(s);
   __syncthreads();
   write_triangles<N>(s, p);
+  if constexpr (Coincident) write_coincident<N, T, Normals>(s, p, threshold);
 }
 
 }  // namespace isobrick::gpu

@@ -48,6 +48,22 @@ __device__ inline EdgePlace place_at(std::uint32_t address) {
   return place;
 }
 
+/// The number in the mesh of the vertex on an edge of a cell at `x`. `row` is four times that of
+/// the cell, `places` the address of the table.
+__device__ inline std::uint32_t number_on_edge(const TileShared& s, std::uint32_t places,
+                                               std::uint32_t x, std::uint32_t row,
+                                               std::uint32_t edge) {
+  const char* base = reinterpret_cast<const char*>(&s);
+  const auto word = [base](std::uint32_t at) {
+    return *reinterpret_cast<const std::uint32_t*>(base + at);
+  };
+  const auto of_x0 = static_cast<std::uint32_t>(sizeof s.places[0]);
+  const EdgePlace place = place_at(8 * edge | (x == 0 ? places + of_x0 : places));
+  const std::uint32_t at = row + place.offset;
+  return word(at + kNumberOfWord) + place.addend +
+         static_cast<std::uint32_t>(__popc(word(at) & low_bits(x)));
+}
+
 /// Writes triangle `number` of a listed cell. `places` is the address of the table.
 __device__ inline void write_triangle(const TileShared& s, std::uint32_t places, std::uint32_t cell,
                                       std::uint32_t number, Triangle& to) {

@@ -57,8 +57,8 @@ class ISOBRICK_API DeviceVolume {
   std::unique_ptr<Impl> impl_;
 };
 
-/// The tiles that surfaces in `searched` look at, in Morton order. `reach` is 1 with normals or
-/// where samples may be NaN, else 0.
+/// The tiles that surfaces in `searched` look at, in Morton order. `reach` is 1 with normals,
+/// where samples may be NaN or where degenerate triangles are left out, else 0.
 ISOBRICK_API std::vector<Int3> tiles_to_load(const Lattice& lattice, std::span<const Int3> searched,
                                              Index reach);
 
@@ -76,6 +76,7 @@ struct DeviceCounts {
   std::uint64_t vertices = 0;      ///< of the mesh
   std::uint64_t triangles = 0;     ///< of the mesh
   std::uint32_t active_tiles = 0;  ///< tiles that the surface passes through
+  std::uint64_t degenerate_triangles = 0;  ///< left out, with SurfaceOptions::drop_degenerate
 };
 
 /// Isosurfaces of a resident volume: search and extraction without leaving the
@@ -84,8 +85,8 @@ struct DeviceCounts {
 class ISOBRICK_API ResidentExtractor {
  public:
   /// The isovalue of `options` does not matter. Takes at most `max_bytes` of device memory besides
-  /// the volume's. Throws UsageError for what the device cannot do yet: dropping degenerate
-  /// triangles, meshes that are not welded; OutOfDeviceMemory.
+  /// the volume's. Throws UsageError for what the device cannot do yet: caps, Topology::trilinear,
+  /// meshes that are not welded; OutOfDeviceMemory.
   ResidentExtractor(DeviceVolume& volume, const SurfaceOptions& options,
                     const ResidentTuning& tuning = {}, std::uint64_t max_bytes = ~std::uint64_t{0});
   ~ResidentExtractor();

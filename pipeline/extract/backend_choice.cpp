@@ -59,7 +59,7 @@ void check_cuda_device(int device, int devices) {
 bool can_be_resident(PassRequests requests) {
   return isovalues_of(requests).size() > 1 &&
          std::all_of(requests.begin(), requests.end(), [](const ExtractRequest& r) {
-           return r.surface.indexing == Indexing::welded && !r.surface.drop_degenerate;
+           return r.surface.indexing == Indexing::welded;
          });
 }
 

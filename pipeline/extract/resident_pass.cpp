@@ -39,7 +39,8 @@ class ResidentPass {
         find_surface_tiles(stream, lattice(), reach_of(surfaces_.requests), max_tiles);
     if (!tiles) return false;
     report_search(stream, surfaces_.reports);
-    const gpu::ResidentSizes sizes = gpu::resident_sizes(lattice(), tiles->count(), any_normals());
+    const gpu::ResidentSizes sizes = gpu::resident_sizes(lattice(), tiles->count(), any_normals(),
+                                                         any_drop_degenerate());
     const std::uint64_t beside = std::max(sizes.extractor_bytes, loader_.device_bytes());
     if (sizes.volume_bytes + beside + kPieceOfDriver > budget_) return false;
     try {
@@ -84,6 +85,10 @@ class ResidentPass {
     return std::any_of(surfaces_.requests.begin(), surfaces_.requests.end(),
                        [](const ExtractRequest& r) { return r.surface.normals; });
   }
+  bool any_drop_degenerate() const {
+    return std::any_of(surfaces_.requests.begin(), surfaces_.requests.end(),
+                       [](const ExtractRequest& r) { return r.surface.drop_degenerate; });
+  }
 
   std::uint64_t bytes_of(const ExtractRequest& request) const {
     return request.active_bricks * lattice().brick_bytes();
@@ -103,6 +108,7 @@ class ResidentPass {
         const gpu::DeviceCounts made = extractor->extract(surface.isovalue);
         surfaces_.reports[i].vertices = made.vertices;
         surfaces_.reports[i].triangles = made.triangles;
+        surfaces_.reports[i].degenerate_triangles = made.degenerate_triangles;
         room -= std::min(room, extractor->bytes());
         extractors_.push_back(std::move(extractor));
       } catch (const Error&) {

@@ -32,6 +32,15 @@ isobrick::Mesh on_cpu(const Field<T>& field, const Lattice& lattice, const Brick
   return std::move(extractor.mesh());
 }
 
+/// The degenerate triangles that it left out.
+template <class T>
+std::uint64_t left_out_on_cpu(const Field<T>& field, const Lattice& lattice,
+                              const BrickLookup& bricks, const SurfaceOptions& options) {
+  CpuExtractor extractor(lattice, options, {});
+  extractor.extract(active_tiles(field, options.isovalue), bricks, nullptr);
+  return extractor.report().degenerate_triangles;
+}
+
 template <class V>
 bool same_bytes(const PodBuffer<V>& a, const PodBuffer<V>& b) {
   return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(V)) == 0;
@@ -96,6 +105,24 @@ struct TestFields {
   static constexpr double lowest() { return std::is_signed_v<T> ? -100.0 : 0.0; }
   static Field<T> noise(Int3 extent, unsigned seed) {
     return padded_noise<T>(extent, lowest(), lowest() + 200, static_cast<T>(lowest()), seed);
+  }
+  /// Few values, some of which are lowest() + 100.
+  static Field<T> coarse(Int3 extent, unsigned seed, unsigned values = 4) {
+    std::mt19937 random(seed);
+    return Field<T>(extent, [&](Int3) { return lowest() + 99 + static_cast<double>(random() % values); });
+  }
+  /// Nothing but around the corner of eight tiles, and little there.
+  static Field<T> at_a_corner(unsigned seed) {
+    std::mt19937 random(seed);
+    const Index size = 1 + static_cast<Index>(seed % 4);
+    const Int3 corner{32, 32, 32}, sizes{size, size, size};
+    const Box3 core{corner - sizes, corner + sizes};
+    return Field<T>({50, 45, 66}, [&](Int3 p) {
+      if (p == corner) return lowest() + 101;
+      return lowest() + (core.contains(p) && random() % (1 + seed / 4 % 5) == 0
+                             ? static_cast<double>(99 + random() % 4)
+                             : 99.0);
+    });
   }
   static Field<T> waves(Int3 extent) {
     return Field<T>(extent, [&](Int3 p) {

@@ -75,6 +75,18 @@ TYPED_TEST(GpuArray, OfAnyLayoutIsTheMeshOfTheCpu) {
   }
 }
 
+TYPED_TEST(GpuArray, DegenerateTrianglesAreLeftOut) {
+  const auto field = this->coarse({67, 41, 75}, 1);
+  const ArrayOnDevice<TypeParam> on_device(field, kSampleLayouts[2]);
+  CachedExtractor extractor(on_device.array);
+  for (const bool drop : {false, true, false})
+    for (const double above : {0.0, 0.5}) {
+      SurfaceOptions options = surface(this->lowest() + 100 + above, field.extent, true);
+      options.drop_degenerate = drop;
+      expect_same(expected_mesh(field, options), extract(extractor, options).download());
+    }
+}
+
 TYPED_TEST(GpuArray, OfAnyExtentIsTheMeshOfTheCpu) {
   for (const Int3 extent : {Int3{1, 1, 1}, Int3{2, 2, 2}, Int3{32, 33, 64}, Int3{131, 70, 97}}) {
     const auto field = this->waves(extent);
@@ -235,9 +247,9 @@ TEST_F(GpuArrayOf, WhatMakesNoSenseIsRefused) {
   EXPECT_THROW(CachedExtractor(DeviceArray::of(field.samples.data(), field.extent)), UsageError);
   const ArrayOnDevice<float> on_device(field);
   CachedExtractor extractor(on_device.array);
-  SurfaceOptions dropping = surface(0, field.extent);
-  dropping.drop_degenerate = true;
-  EXPECT_THROW(extract(extractor, dropping), UsageError);
+  SurfaceOptions capped = surface(0, field.extent);
+  capped.cap = true;
+  EXPECT_THROW(extract(extractor, capped), UsageError);
   EXPECT_THROW(extract(extractor, surface(std::nan(""), field.extent)), UsageError);
   EXPECT_THROW(extract(extractor, surface(0, field.extent), 1 << 4), UsageError);
   EXPECT_THROW(extract(extractor, surface(0, field.extent), 1 << 16), gpu::OutOfDeviceMemory);

@@ -35,6 +35,7 @@ struct Resident {
     const gpu::DeviceCounts counts = extractor.extract(isovalue);
     EXPECT_EQ(counts.vertices, expected.positions.size());
     EXPECT_EQ(counts.triangles, expected.triangles.size());
+    EXPECT_EQ(counts.degenerate_triangles, left_out_on_cpu(field, lattice, bricks, options));
     isobrick::Mesh mesh;
     extractor.download(mesh);
     expect_same(expected, mesh);

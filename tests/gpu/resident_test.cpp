@@ -65,6 +65,19 @@ TYPED_TEST(GpuResident, ExtentsThatFillNoTile) {
     compare(this->noise(extent, 7), {this->lowest() + 100}, {});
 }
 
+TYPED_TEST(GpuResident, DegenerateTrianglesAreLeftOut) {
+  SurfaceOptions options;
+  options.drop_degenerate = true;
+  const double mid = this->lowest() + 100;
+  // With isovalues that samples equal and others in turn.
+  compare(this->coarse({67, 41, 75}, 1), {mid, mid + 0.5, mid + 1}, options);
+  compare(this->waves({131, 70, 97}), {mid - 40, mid, mid + 0.5}, options, 32);
+  for (unsigned seed = 0; seed < 40; ++seed) compare(this->at_a_corner(seed), {mid}, options);
+  options.roi = {{3, 0, 31}, {50, 33, 64}};
+  options.transform.spacing = {0.7, 1.3, -2};
+  compare(this->coarse({67, 41, 75}, 2), {mid}, options);
+}
+
 /// A plane of edges at the volume's upper border, and no cell above it.
 TYPED_TEST(GpuResident, VolumesThatEndInsideATile) {
   const double mid = this->lowest() + 100;
@@ -245,15 +258,21 @@ TYPED_TEST(GpuResident, WhatTheDeviceCannotDoIsRefused) {
   gpu::DeviceVolume volume(lattice, bricks, 0);
   SurfaceOptions good;
   good.roi = lattice.box();
-  SurfaceOptions dropping = good, local = good, nowhere = good;
-  dropping.drop_degenerate = true;
+  SurfaceOptions capped = good, local = good, nowhere = good;
+  capped.cap = true;
   local.indexing = Indexing::chunk_local;
   nowhere.roi = {{1000, 0, 0}, {1001, 1, 1}};
-  EXPECT_THROW(gpu::ResidentExtractor(volume, dropping), UsageError);
+  EXPECT_THROW(gpu::ResidentExtractor(volume, capped), UsageError);
   EXPECT_THROW(gpu::ResidentExtractor(volume, local), UsageError);
   EXPECT_THROW(gpu::ResidentExtractor(volume, nowhere), UsageError);
   gpu::ResidentExtractor extractor(volume, good);
   EXPECT_THROW(extractor.extract(std::nan("")), UsageError);
+}
+
+TYPED_TEST(GpuResident, DegenerateTrianglesOfMoreTilesThanTables) {
+  SurfaceOptions options;
+  options.drop_degenerate = true;
+  compare(this->coarse({2, 1100, 1000}, 5, 3), {this->lowest() + 100}, options);
 }
 
 template <class T>

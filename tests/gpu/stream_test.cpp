@@ -159,6 +159,7 @@ void compare(const Field<T>& field, double isovalue, SurfaceOptions options,
       expect_same(*expected, made.mesh);
       EXPECT_EQ(made.report.vertices, expected->positions.size());
       EXPECT_EQ(made.report.triangles, expected->triangles.size());
+      EXPECT_EQ(made.report.degenerate_triangles, left_out_on_cpu(field, lattice, all, options));
       if (::testing::Test::HasFailure()) return;
     }
   }
@@ -276,6 +277,23 @@ TYPED_TEST(GpuStream, RegionsOfInterest) {
   }
 }
 
+TYPED_TEST(GpuStream, DegenerateTrianglesAreLeftOut) {
+  SurfaceOptions options;
+  options.drop_degenerate = true;
+  const double mid = this->lowest() + 100;
+  compare(this->coarse(kOdd, 1), mid, options, kManyWays);
+  compare(this->waves(kOdd), mid, options, {{5, 3, 64}});
+  compare(this->coarse(kOdd, 2), mid + 0.5, options, {{5, 3, 64}});
+  for (unsigned seed = 0; seed < 40; ++seed)
+    compare(this->at_a_corner(seed), mid, options, {{1 + seed % 4, 3, 64}});
+  options.indexing = Indexing::chunk_local;
+  compare(this->coarse(kOdd, 3), mid, options, {{512, ~std::size_t{0}, 64}, {3, 4, 48}});
+  options.indexing = Indexing::welded;
+  options.roi = {{20, 3, 31}, {66, 40, 90}};
+  options.inside = Inside::below;
+  compare(this->coarse(kOdd, 4), mid, options, {{5, 3, 64}});
+}
+
 template <class T>
 using GpuStreamWithNaN = DeviceTest<T>;
 
@@ -359,7 +377,7 @@ TEST(GpuExtractor, WhatHasNoKernelsIsRefused) {
         gpu::GpuExtractor(0, lattice, options, gpu::stream_sizes(lattice, options, 1), sink),
         UsageError);
   };
-  refused(ScalarType::u8, [](SurfaceOptions& o) { o.drop_degenerate = true; });
+  refused(ScalarType::u8, [](SurfaceOptions& o) { o.cap = true; });
   refused(ScalarType::u8, [](SurfaceOptions& o) { o.topology = Topology::trilinear; });
   refused(ScalarType::u8, [](SurfaceOptions& o) { o.isovalue = std::nan(""); });
   refused(ScalarType::u8, [](SurfaceOptions& o) { o.roi = {{99, 0, 0}, {100, 1, 1}}; });

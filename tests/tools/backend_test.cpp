@@ -171,6 +171,21 @@ TEST_F(Cuda, FilesAreThoseOfTheCpu) {
   compare(store, ".stl", {"--roi", "11:99,40:,:77", "--normals", "gradient"});
 }
 
+TEST_F(Cuda, DegenerateTrianglesAreLeftOut) {
+  const std::string store = waves("u8", {"--brick", "32"});
+  for (const std::string extension : {".ply", ".stl"}) {
+    const auto extract = [&](const std::string& backend) {
+      return run_json({"extract", store, "--isovalue", "127", "--drop-degenerate", "--force",
+                       "--backend", backend, "-o", path(backend + extension)})["surfaces"][0];
+    };
+    const nlohmann::json cpu = extract("cpu"), cuda = extract("cuda");
+    EXPECT_EQ(cuda["backend"], "cuda");
+    EXPECT_GT(cpu["degenerate_triangles"].get<int>(), 0);
+    EXPECT_EQ(cuda["degenerate_triangles"], cpu["degenerate_triangles"]);
+    EXPECT_TRUE(read_file(path("cpu" + extension)) == read_file(path("cuda" + extension)));
+  }
+}
+
 /// Also where a budget has no room for all surfaces beside each other.
 TEST_F(Cuda, SeveralSurfacesInOnePassAreThoseOfTheCpu) {
   const std::string store = waves("u16", {"--brick", "32"});
@@ -257,6 +272,7 @@ TEST_F(ResidentCuda, FilesAreThoseOfTheCpu) {
     }
     compare_all(store, isovalues, ".ply", {"--normals", "gradient"}, "256M", 3);
     compare_all(store, isovalues, ".ply", {"--roi", "11:99,40:,:77"}, "256M", 3);
+    compare_all(store, isovalues, ".ply", {"--drop-degenerate"}, "256M", 3);
   }
 }
 

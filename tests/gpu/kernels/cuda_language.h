@@ -94,6 +94,11 @@ T atomicAdd(T* to, std::type_identity_t<T> value) {
 }
 
 template <class T>
+T atomicOr(T* to, std::type_identity_t<T> value) {
+  return std::atomic_ref(*to).fetch_or(value, std::memory_order_relaxed);
+}
+
+template <class T>
 T atomicMin(T* to, std::type_identity_t<T> value) {
   std::atomic_ref word(*to);
   T known = word.load(std::memory_order_relaxed);

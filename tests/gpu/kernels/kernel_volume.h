@@ -133,6 +133,13 @@ class KernelVolume {
   isobrick::Mesh mesh(double isovalue) const {
     return expected_mesh(field_, lattice, bricks_, options, isovalue);
   }
+  /// Degenerate triangles.
+  std::uint64_t left_out(double isovalue) const {
+    SurfaceOptions o = options;
+    o.isovalue = isovalue;
+    return tbb::task_arena(1).execute(
+        [&] { return left_out_on_cpu(field_, lattice, bricks_, o); });
+  }
 
   /// What the search for active tiles is given.
   gpu::SearchParams search_params(double isovalue) const {
@@ -218,16 +225,22 @@ struct KernelState {
         slots(grid_tiles, gpu::kNone),
         order(tiles),
         row_tables(tiles),
-        zeroed(2 + (tiles + gpu::kTilesOfSearchBlock - 1) / gpu::kTilesOfSearchBlock) {}
+        sample_tables(tiles),
+        work(kBlocks),
+        zeroed(3 + (tiles + gpu::kTilesOfSearchBlock - 1) / gpu::kTilesOfSearchBlock) {}
 
   std::vector<gpu::TileItem> items;
   std::vector<std::uint32_t> slots;
   std::vector<gpu::OrderState> order;
   std::vector<gpu::RowTable> row_tables;
+  std::vector<gpu::SampleTable> sample_tables;
+  static constexpr unsigned kBlocks = 3;  ///< at most, of an extraction
+  std::vector<gpu::CoincidentWork> work;
   std::uint32_t launches = 0, epoch = 0;
   unsigned long long number_start = 0, number_end = 0;
   std::uint32_t found = 0, item_count = 0;
-  /// Tickets of search and extraction, blocks that are done, a word of padding; the search's sums.
+  /// Tickets of search and extraction, blocks that are done, a word of padding; degenerate
+  /// triangles; the search's sums.
   std::vector<unsigned long long> zeroed;
   gpu::LaunchReport report{};
 
@@ -241,7 +254,7 @@ struct KernelState {
     p.item_room = static_cast<std::uint32_t>(items.size());
     p.slot_of_tile = slots.data();
     p.order = order.data();
-    p.sums = zeroed.data() + 2;
+    p.sums = zeroed.data() + 3;
     p.ticket = zeroed_words();
   }
   /// For the extraction of what that has found.
@@ -255,6 +268,7 @@ struct KernelState {
     p.number_start = &number_start;
     p.number_end = &number_end;
     p.ticket = zeroed_words() + 1;
+    p.coincident = {work.data(), sample_tables.data(), nullptr, &zeroed[2]};
     p.end = {&report,
              ++launches,
              &found,
@@ -267,12 +281,13 @@ struct KernelState {
   std::uint64_t word(int i) {
     return std::atomic_ref(report.words[i]).load(std::memory_order_relaxed);
   }
-  void expect_reported(const isobrick::Mesh& mesh) {
+  void expect_reported(const isobrick::Mesh& mesh, std::uint64_t left_out = 0) {
     using gpu::LaunchReport, gpu::LaunchWord;
     const std::uint64_t vertices = mesh.positions.size(), triangles = mesh.triangles.size();
     EXPECT_EQ(word(LaunchReport::kVertices), LaunchWord::of(vertices, launches));
     EXPECT_EQ(word(LaunchReport::kTriangles), LaunchWord::of(triangles, launches));
     EXPECT_EQ(word(LaunchReport::kActiveTiles), LaunchWord::of(found, launches));
+    EXPECT_EQ(word(LaunchReport::kLeftOut), LaunchWord::of(left_out, launches));
   }
   /// As the next isovalue needs it.
   void expect_zeroed() const {

@@ -20,6 +20,8 @@ class Streamed {
         options_(options),
         slots_(kSlots, lattice.tiles()),
         row_tables_(kSlots),
+        sample_tables_(kSlots),
+        work_(3),
         cases_(gpu::make_case_table(world_map(options.transform, options.inside).mirrored)),
         tile_bricks_(static_cast<std::uint32_t>(max_bricks_of_tile(lattice, reach()))) {}
 
@@ -46,20 +48,24 @@ class Streamed {
     p.order = order.data();
     p.number_start = &start;
     p.number_end = &end;
+    p.coincident = {work_.data(), sample_tables_.data(), neighbours_.data(), &totals.left_out};
     emulated::run_tiles({.type = lattice_.type,
                          .normals = options_.normals,
                          .may_have_nan = options_.may_have_nan,
+                         .drop_degenerate = options_.drop_degenerate,
                          .blocks = std::min(3u, count_),
                          .seed = ++epoch_},
                         p, cases_);
     slots_.recycle(unused_);
     vertices_ += totals.vertices;
     triangles_ += totals.triangles;
+    left_out_ += totals.left_out;
     EXPECT_EQ(end, vertices_);
   }
 
   std::uint64_t vertices() const { return vertices_; }
   std::uint64_t triangles() const { return triangles_; }
+  std::uint64_t left_out() const { return left_out_; }
 
  private:
   static constexpr std::uint32_t kSlots = 200;
@@ -81,6 +87,7 @@ class Streamed {
   void link_all(std::span<const TileWork> tiles) {
     items_.resize(count_);
     links_.resize(count_);
+    neighbours_.resize(count_);
     const Int3 lo = options_.roi.lo, first{lo.x / 32, lo.y / 32, lo.z / 32};
     for (std::uint32_t i = 0; i < count_; ++i) {
       const Int3 t = tiles[i].tile;
@@ -91,6 +98,7 @@ class Streamed {
                             (step.z == 0 || t.z > first.z);
         links_[i].before[n - 1] = exists ? slots_.find(t - step) : gpu::kNone;
       }
+      slots_.find_around(t, neighbours_[i]);
       items_[i] = {static_cast<std::int32_t>(t.x), static_cast<std::int32_t>(t.y),
                    static_cast<std::int32_t>(t.z), slots_.add(t)};
     }
@@ -108,7 +116,7 @@ class Streamed {
     u.bricks = addresses_.data();
     u.tile_bricks = tile_bricks_;
     u.reach = static_cast<int>(reach());
-    u.corners = options_.may_have_nan;
+    u.corners = options_.may_have_nan || options_.drop_degenerate;
     for (int axis = 0; axis < 3; ++axis) {
       u.brick[axis] = static_cast<std::int32_t>(lattice_.brick[axis]);
       u.extent[axis] = static_cast<std::int32_t>(lattice_.extent[axis]);
@@ -134,14 +142,17 @@ class Streamed {
   SurfaceOptions options_;
   gpu::RowSlots slots_;
   std::vector<gpu::RowTable> row_tables_;
+  std::vector<gpu::SampleTable> sample_tables_;
+  std::vector<gpu::CoincidentWork> work_;
   gpu::CaseTable cases_;
   std::uint32_t tile_bricks_, count_ = 0, epoch_ = 0;
-  std::uint64_t vertices_ = 0, triangles_ = 0;
+  std::uint64_t vertices_ = 0, triangles_ = 0, left_out_ = 0;
   std::vector<gpu::BrickBox> boxes_;
   std::vector<std::uint64_t> addresses_;
   std::vector<std::byte> sent_;
   std::vector<gpu::TileItem> items_;
   std::vector<gpu::TileLinks> links_;
+  std::vector<gpu::TileNeighbours> neighbours_;
   std::vector<std::uint32_t> unused_;
   std::vector<T> tile_blocks_;
 };
@@ -169,6 +180,7 @@ void compare(const Field<T>& field, const Lattice& lattice, const BrickLookup& b
     room.expect(expected);
     EXPECT_EQ(streamed.vertices(), expected.positions.size());
     EXPECT_EQ(streamed.triangles(), expected.triangles.size());
+    EXPECT_EQ(streamed.left_out(), left_out_on_cpu(field, lattice, bricks, options));
   }
 }
 
@@ -212,6 +224,19 @@ TYPED_TEST(StreamKernels, BricksThatAreAbsent) {
   const HoledField<TypeParam> holed(TestFields<TypeParam>::noise({80, 34, 40}, 9),
                                     static_cast<TypeParam>(TestFixture::kMid + 50));
   compare(holed.field, holed.lattice, holed, holed.options(TestFixture::kMid), 4);
+}
+
+TYPED_TEST(StreamKernels, DegenerateTrianglesAreLeftOut) {
+  SurfaceOptions options;
+  options.isovalue = TestFixture::kMid;
+  options.drop_degenerate = true;
+  const auto compare_field = [&](const Field<TypeParam>& field, std::size_t tiles_of_launch) {
+    const Lattice lattice{field.extent, {16, 40, 23}, scalar_type_of<TypeParam>};
+    compare(field, lattice, DenseBricks(lattice, field.samples.data()), options, tiles_of_launch);
+  };
+  const auto coarse = TestFields<TypeParam>::coarse({67, 41, 70}, 7);
+  for (const std::size_t tiles : {1u, 100u}) compare_field(coarse, tiles);
+  compare_field(TestFields<TypeParam>::at_a_corner(6), 3);
 }
 
 TEST(StreamKernelsOf, NotANumber) {

@@ -27,6 +27,7 @@ void compare(const KernelVolume<T>& volume, TileRun run, const std::vector<doubl
   run.type = scalar_type_of<T>;
   run.normals = volume.options.normals;
   run.may_have_nan = volume.options.may_have_nan;
+  run.drop_degenerate = volume.options.drop_degenerate;
   KernelState state(volume.tiles(), volume.grid_tiles());
   std::size_t made = 0;
   for (const double isovalue : isovalues) {
@@ -37,7 +38,7 @@ void compare(const KernelVolume<T>& volume, TileRun run, const std::vector<doubl
     MeshRoom room(expected.positions.size(), expected.triangles.size());
     run_both(volume, run, isovalue, state, room);
     room.expect(expected);
-    state.expect_reported(expected);
+    state.expect_reported(expected, run.drop_degenerate ? volume.left_out(isovalue) : 0);
     state.expect_zeroed();
     ++run.seed;
     made += expected.triangles.size();
@@ -177,6 +178,42 @@ TEST(TileKernelOf, BlocksOfAnyNumberOfThreads) {
     compare(TestFields<std::uint8_t>::noise({40, 35, 20}, 6), {.threads = threads}, {100});
     compare(TestFields<std::uint8_t>::waves({67, 41, 20}), {.threads = threads}, {100, 130});
   }
+}
+
+TYPED_TEST(TileKernel, DegenerateTrianglesAreLeftOut) {
+  constexpr double mid = TestFixture::kMid;
+  SurfaceOptions options;
+  options.drop_degenerate = true;
+  compare(TestFixture::Fields::coarse({37, 41, 35}, 1), {.blocks = 3}, {mid, mid + 1}, options);
+  compare(TestFixture::Fields::coarse({67, 34, 9}, 2, 2), {}, {mid}, options);
+  // Tiles with such vertices and without.
+  compare(TestFixture::Fields::waves({67, 41, 40}), {}, {mid}, options);
+}
+
+TYPED_TEST(TileKernel, DegenerateTrianglesOfARegion) {
+  SurfaceOptions options;
+  options.drop_degenerate = true;
+  options.roi = {{3, 0, 31}, {50, 33, 40}};
+  options.transform.spacing = {0.7, 1.3, -2};
+  for (const Inside inside : {Inside::above, Inside::below}) {
+    options.inside = inside;
+    compare(TestFixture::Fields::coarse({55, 35, 44}, 5), {}, {TestFixture::kMid}, options);
+  }
+}
+
+/// Where eight tiles meet, whoever of them has the first triangle.
+TEST(TileKernelOf, DegenerateTrianglesAtTheCornerOfEightTiles) {
+  SurfaceOptions options;
+  options.drop_degenerate = true;
+  for (unsigned seed = 0; seed < 16; ++seed)
+    compare(TestFields<std::int16_t>::at_a_corner(seed), {.seed = seed}, {0}, options);
+}
+
+TEST(TileKernelOf, DegenerateTrianglesBesideNaN) {
+  SurfaceOptions options;
+  options.drop_degenerate = options.may_have_nan = true;
+  compare(with_nan(TestFields<float>::coarse({40, 50, 34}, 1), 2, 20), {}, {0}, options);
+  compare(with_nan(TestFields<double>::coarse({33, 50, 34}, 1), 2, 5), {}, {1}, options);
 }
 
 TEST(TileKernelOf, NotANumber) {

@@ -15,14 +15,14 @@
 namespace isobrick::emulated {
 namespace {
 
-template <int N, class T, bool Normals, bool Nan>
+template <int N, class T, bool Normals, bool Nan, bool Coincident = false>
 struct Kernel {
   static constexpr std::uint32_t kListed = gpu::ListsOf<N>::kListed;
 
   static void run(const TileRun& r, const gpu::TileParams& params, const gpu::CaseTable& cases) {
     const T threshold = Threshold<T>(params.isovalue).value;
     launch(r.blocks, N, gpu::kSharedBytes<kListed, Nan>, r.seed,
-           [&] { gpu::extract_tiles<N, T, Normals, Nan>(params, threshold, &cases); });
+           [&] { gpu::extract_tiles<N, T, Normals, Nan, Coincident>(params, threshold, &cases); });
   }
 };
 
@@ -47,6 +47,12 @@ auto with_nan_kernel(const TileRun& r, F& f) {
 
 template <class F>
 auto with_kernel(const TileRun& r, F&& f) {
+  if (r.drop_degenerate)
+    return visit_scalar(r.type, [&](auto tag) {
+      using T = typename decltype(tag)::type;
+      return r.normals ? f(Kernel<384, T, true, true, true>())
+                       : f(Kernel<384, T, false, true, true>());
+    });
   if (r.may_have_nan)
     return r.type == ScalarType::f64 ? with_nan_kernel<double>(r, f) : with_nan_kernel<float>(r, f);
   switch (r.threads) {
