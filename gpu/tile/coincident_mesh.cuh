@@ -80,6 +80,7 @@ __device__ inline void write_sample_vertices(const TileShared& s, const TilePara
   const Maker maker{s, p, static_cast<typename Maker::R>(p.isovalue)};
   for (auto row = static_cast<int>(warp_id()); row < kRowsOfTile; row += BlockConfig<N>::kWarps) {
     const unsigned long long own = table.own[row];
+    if (own == 0) continue;
     const auto z = static_cast<int>(z_of_row(static_cast<std::uint32_t>(row))), y = row - 33 * z;
     for (auto x = static_cast<int>(lane_id()); x < 33; x += 32) {
       if (!(own >> x & 1u)) continue;
@@ -88,10 +89,9 @@ __device__ inline void write_sample_vertices(const TileShared& s, const TilePara
                                                  static_cast<float>(s.shape.origin[1] + y),
                                                  static_cast<float>(s.shape.origin[2] + z)}));
       if constexpr (Normals)
-        store_once(p.normals[i],
-                   p.world.unit_normal(
-                       maker.gradient(x, y, z, static_cast<typename Maker::R>(value)),
-                       first_active_edge(s, p, value, x, y, z)));
+        store_once(p.normals[i], p.world.unit_normal(
+                                     maker.gradient(x, y, z, static_cast<typename Maker::R>(value)),
+                                     first_active_edge(s, p, value, x, y, z)));
     }
   }
 }
@@ -120,8 +120,7 @@ __device__ inline void write_kept_triangles(const TileShared& s, const TileParam
         const std::uint32_t vertex = vertex_on(edges >> (3 + 4 * c) & 15u, at);
         const auto corner = static_cast<int>(vertex);
         const std::uint32_t number =
-            vertex < 8 ? number_of_sample(s, p, w,
-                                          row + (corner >> 1 & 1) + 33 * (corner >> 2),
+            vertex < 8 ? number_of_sample(s, p, w, row + (corner >> 1 & 1) + 33 * (corner >> 2),
                                           x + (corner & 1))
                        : number_on_edge(s, places, static_cast<std::uint32_t>(x),
                                         4 * static_cast<std::uint32_t>(row), vertex - 8);

@@ -29,14 +29,15 @@ struct TileNeighbours {
 struct CoincidentWork {
   /// Bit x + 1 of row (y + 1) + kEdgeAround · (z + 1).
   unsigned long long inside[kRowsAround], at[kRowsAround];
-  unsigned long long used[kRowsOfTile];     ///< bit x: a triangle has a corner on sample x
-  std::uint32_t cells[kRowsOfTile];         ///< active cells with a coincident vertex
-  std::uint32_t triangles[kRowsOfTile];     ///< kept ones of such cells in the rows before
-  std::uint8_t owners[33 * kRowsOfTile];    ///< which tile makes a used vertex, if not this one
-  std::uint32_t own, kept, left_out;        ///< vertices; triangles
-  std::uint32_t other_owners;               ///< bits: tiles around that make used vertices
-  std::uint32_t first_number[27];           ///< in the mesh, of their vertices
-  const SampleTable* tables[27];            ///< theirs
+  unsigned long long used[kRowsOfTile];   ///< bit x: a triangle has a corner on sample x
+  std::uint32_t cells[kRowsOfTile];       ///< active cells with a coincident vertex
+  std::uint32_t triangles[kRowsOfTile];   ///< kept ones of such cells in the rows before
+  std::uint8_t owners[33 * kRowsOfTile];  ///< which tile makes a used vertex, if not this one
+  std::uint32_t any;                      ///< whether there are coincident vertices
+  std::uint32_t own, kept, left_out;      ///< vertices; triangles
+  std::uint32_t other_owners;             ///< bits: tiles around that make used vertices
+  std::uint32_t first_number[27];         ///< in the mesh, of their vertices
+  const SampleTable* tables[27];          ///< theirs
 };
 
 /// Blocks of threads that such a kernel has at most: each has a CoincidentWork.

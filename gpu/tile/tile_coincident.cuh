@@ -54,7 +54,7 @@ struct KeptTriangles {
   }
 };
 
-/// Which samples around a tile are inside, and which are coincident vertices.
+/// Which samples around a tile are inside, and which are coincident vertices; notes whether any is.
 template <int N, class T>
 __device__ inline void find_coincident_samples(const TileShared& s, const TileParams& p,
                                                CoincidentWork& w, T value) {
@@ -64,6 +64,7 @@ __device__ inline void find_coincident_samples(const TileShared& s, const TilePa
     if (lane_id() > 0) return;
     w.inside[row] = inside;
     w.at[row] = at;
+    if (at != 0) BlockWord(w.any).store(1, cuda::memory_order_relaxed);
   });
 }
 
@@ -134,8 +135,8 @@ __device__ inline std::uint32_t owner_of(const TileShared& s, const NanRows& mis
 
 /// Divides the used vertices of each row into the tile's own and those of others.
 template <int N>
-__device__ inline void find_owners(const TileShared& s, const TileParams& p,
-                                   const NanRows& missing, CoincidentWork& w) {
+__device__ inline void find_owners(const TileShared& s, const TileParams& p, const NanRows& missing,
+                                   CoincidentWork& w) {
   SampleTable& table = p.coincident.tables[s.tile.slot];
   for (auto row = static_cast<int>(own_thread()); row < kRowsOfTile; row += N) {
     const auto z = static_cast<int>(z_of_row(static_cast<std::uint32_t>(row))), y = row - 33 * z;
@@ -178,13 +179,15 @@ template <int N, class T>
 __device__ inline void find_coincident(TileShared& s, const TileParams& p, T value) {
   CoincidentWork& w = coincident_work(p);
   const NanRows& missing = nan_rows_of(s);
+  if (threadIdx.x == 0) w.any = w.own = w.kept = w.left_out = w.other_owners = 0;
+  __syncthreads();
   find_coincident_samples<N>(s, p, w, value);
   for (unsigned row = own_thread(); row < kRowsOfTile; row += N) {
     w.used[row] = 0;
     w.cells[row] = w.triangles[row] = 0;
   }
-  if (threadIdx.x == 0) w.left_out = w.other_owners = 0;
   __syncthreads();
+  if (w.any == 0) return;
   mark_used<N>(s, missing, w);
   __syncthreads();
   find_owners<N>(s, p, missing, w);

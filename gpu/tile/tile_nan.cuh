@@ -53,12 +53,12 @@ __device__ inline void for_each_row_around(const TileShared& s, const TileParams
   };
   const int beside = lane == 0 ? -1 : 31 + lane;  // lanes 0, 1, 2: the samples beside the 32
   const bool row_exists = exists(0, lane), beside_exists = lane < 3 && exists(0, beside);
+#pragma unroll 4  // loads that are on their way together
   for (auto row = static_cast<int>(warp_id()); row < kRowsAround; row += BlockConfig<N>::kWarps) {
     const int y = row % kEdgeAround - 1, z = row / kEdgeAround - 1;
     const bool here = exists(1, y) && exists(2, z);
     const bool in = here && row_exists, in_beside = here && beside_exists;
-    f(row,
-      SamplesInRow<T>{in, in_beside, load(in, lane, y, z), load(in_beside, beside, y, z)});
+    f(row, SamplesInRow<T>{in, in_beside, load(in, lane, y, z), load(in_beside, beside, y, z)});
   }
 }
 

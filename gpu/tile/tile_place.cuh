@@ -79,9 +79,8 @@ __device__ inline void report(const TileParams& p, int word, std::uint64_t value
 __device__ inline void place_vertices(TileShared& s, const TileParams& p) {
   const std::uint32_t item = s.item, vertices = s.all_vertices + s.sample_vertices;
   const unsigned long long start = *p.number_start;
-  const auto base =
-      sum_before([&](std::uint32_t i) -> unsigned long long& { return p.order[i].vertices; }, item,
-                 vertices);
+  const auto base = sum_before(
+      [&](std::uint32_t i) -> unsigned long long& { return p.order[i].vertices; }, item, vertices);
   if (lane_id() != 0) return;
   s.vertex_base = base;
   s.number_base = static_cast<std::uint32_t>(start + base);

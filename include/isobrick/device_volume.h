@@ -73,9 +73,9 @@ struct ResidentTuning {
 
 /// What an extraction on the device made.
 struct DeviceCounts {
-  std::uint64_t vertices = 0;      ///< of the mesh
-  std::uint64_t triangles = 0;     ///< of the mesh
-  std::uint32_t active_tiles = 0;  ///< tiles that the surface passes through
+  std::uint64_t vertices = 0;              ///< of the mesh
+  std::uint64_t triangles = 0;             ///< of the mesh
+  std::uint32_t active_tiles = 0;          ///< tiles that the surface passes through
   std::uint64_t degenerate_triangles = 0;  ///< left out, with SurfaceOptions::drop_degenerate
 };
 

@@ -39,8 +39,8 @@ class ResidentPass {
         find_surface_tiles(stream, lattice(), reach_of(surfaces_.requests), max_tiles);
     if (!tiles) return false;
     report_search(stream, surfaces_.reports);
-    const gpu::ResidentSizes sizes = gpu::resident_sizes(lattice(), tiles->count(), any_normals(),
-                                                         any_drop_degenerate());
+    const gpu::ResidentSizes sizes =
+        gpu::resident_sizes(lattice(), tiles->count(), any_normals(), any_drop_degenerate());
     const std::uint64_t beside = std::max(sizes.extractor_bytes, loader_.device_bytes());
     if (sizes.volume_bytes + beside + kPieceOfDriver > budget_) return false;
     try {

@@ -109,7 +109,8 @@ struct TestFields {
   /// Few values, some of which are lowest() + 100.
   static Field<T> coarse(Int3 extent, unsigned seed, unsigned values = 4) {
     std::mt19937 random(seed);
-    return Field<T>(extent, [&](Int3) { return lowest() + 99 + static_cast<double>(random() % values); });
+    return Field<T>(extent,
+                    [&](Int3) { return lowest() + 99 + static_cast<double>(random() % values); });
   }
   /// Nothing but around the corner of eight tiles, and little there.
   static Field<T> at_a_corner(unsigned seed) {

@@ -137,8 +137,7 @@ class KernelVolume {
   std::uint64_t left_out(double isovalue) const {
     SurfaceOptions o = options;
     o.isovalue = isovalue;
-    return tbb::task_arena(1).execute(
-        [&] { return left_out_on_cpu(field_, lattice, bricks_, o); });
+    return tbb::task_arena(1).execute([&] { return left_out_on_cpu(field_, lattice, bricks_, o); });
   }
 
   /// What the search for active tiles is given.
