@@ -175,6 +175,7 @@ class MpiRanks final : public Ranks {
   int rank() const override { return rank_; }
   int size() const override { return size_; }
   int node_size() const override { return size_of(session_.node); }
+  int node_rank() const override { return rank_in(session_.node); }
 
   std::vector<Bytes> gather(std::span<const std::byte> own) override {
     const int mine = count_of(own.size());

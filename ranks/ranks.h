@@ -36,6 +36,8 @@ class Ranks {
   virtual int size() const = 0;
   /// How many of them run on this machine.
   virtual int node_size() const = 0;
+  /// The number of this one among them, from 0.
+  virtual int node_rank() const = 0;
 
   /// Collective: what each rank gives, by rank.
   virtual std::vector<Bytes> gather(std::span<const std::byte> own) = 0;

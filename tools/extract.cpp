@@ -200,6 +200,13 @@ void note_band(double isovalue, const StoreInfo& info, Console& console) {
       isovalue, -*band, *band));
 }
 
+void check_devices(const ExtractArguments& arguments) {
+  if (arguments.devices.size() < 2) return;
+  if (arguments.backend == Backend::cpu)
+    throw UsageError("--device: several devices share the work of --backend cuda, not of the CPU");
+  check_piece_arguments(arguments, "several devices");
+}
+
 /// Opens the input. The first rank of a job adds what a store lacks before the others open it.
 OpenedVolume open_shared_input(const ExtractArguments& arguments, Ranks* job, Console& console) {
   const auto open = [&] {
@@ -220,7 +227,11 @@ int run_extract(const ExtractArguments& given, Console& console) {
   ExtractArguments arguments = with_preset(given);
   Ranks* const job = arguments.estimate ? nullptr : join_job(arguments.mpi, console);
   check_arguments(arguments);
-  if (job != nullptr) share_machine(*job, arguments.memory, arguments.threads);
+  if (job == nullptr) check_devices(arguments);
+  if (job != nullptr) {
+    share_machine(*job, arguments.memory, arguments.threads);
+    choose_device(*job, arguments);
+  }
   const bool streams =
       is_standard_output(arguments.output) || is_standard_output(arguments.preview.path);
   if (streams && !arguments.estimate) console.reserve_output();
@@ -237,6 +248,8 @@ int run_extract(const ExtractArguments& given, Console& console) {
   for (const ExtractedSurface& surface : surfaces)
     note_band(surface.options.isovalue, store.info(), console);
   const CommandOutput output = arguments.estimate ? estimate_all(surfaces, store, console)
+                               : arguments.devices.size() > 1
+                                   ? make_on_devices(arguments, surfaces, store, console)
                                : arguments.resume || job != nullptr
                                    ? make_by_pieces(arguments, surfaces, store, job, console)
                                    : make_all(arguments, surfaces, store, attributes, console);
@@ -246,6 +259,7 @@ int run_extract(const ExtractArguments& given, Console& console) {
                       {"estimate", arguments.estimate},
                       {"surfaces", output.objects}};
   if (!arguments.estimate) result["passes"] = output.passes;
+  if (arguments.devices.size() > 1) result["devices"] = arguments.devices;
   add_peak(job, result);
   console.result(result, output.text);
   return 0;
@@ -263,6 +277,19 @@ bool parse_normals(const std::string& text) {
   throw UsageError(fmt::format("'{}' is no kind of normals; it is gradient or none", text));
 }
 
+std::vector<int> parse_devices(const std::string& text) {
+  std::vector<int> devices;
+  for (std::size_t begin = 0; begin <= text.size();) {
+    const std::size_t end = std::min(text.find(',', begin), text.size());
+    const int device = parse_int(std::string_view(text).substr(begin, end - begin), 0, 255);
+    if (std::find(devices.begin(), devices.end(), device) != devices.end())
+      throw UsageError(fmt::format("device {} is named twice", device));
+    devices.push_back(device);
+    begin = end + 1;
+  }
+  return devices;
+}
+
 void add_backend_options(CLI::App* app, ExtractArguments& arguments) {
   add_parsed(
       app, arguments.backend, parse_backend,
@@ -271,8 +298,11 @@ void add_backend_options(CLI::App* app, ExtractArguments& arguments) {
   add_parsed(app, arguments.gpu_memory, parse_bytes,
              {"--gpu-memory", "BYTES", "Budget of device memory, such as 512M or 1.5G",
               "what is free less 10 %"});
-  add_parsed(app, arguments.device, [](const std::string& text) { return parse_int(text, 0, 255); },
-             {"--device", "N", "Which CUDA device, the first is 0", "0"});
+  add_parsed(app, arguments.devices, parse_devices,
+             {"--device", "N,...",
+              "Which CUDA device, the first is 0; several, as in 0,1, share the work by way of "
+              "pieces",
+              "0; of ranks each its own"});
 }
 
 void add_level_options(CLI::App* app, ExtractArguments& arguments) {

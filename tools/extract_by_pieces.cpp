@@ -26,23 +26,12 @@ using nlohmann::ordered_json;
 /// piece searches the ranges of the volume once more, so that huge volumes have larger ones.
 constexpr std::uint64_t kBlocksOfPiece = std::uint64_t{1} << 13;
 constexpr std::uint64_t kMaxPieces = 500;
+/// A device makes a piece in milliseconds, and takes as long to begin one.
+constexpr std::uint64_t kBlocksOfPieceOnDevice = std::uint64_t{1} << 16;
 
 /// Of one rank, so that no rank waits long for the last piece.
 constexpr std::uint64_t kPiecesOfRank = 4;
 constexpr std::uint64_t kFewestBlocks = 256;
-
-void check_piece_arguments(const ExtractArguments& arguments, const Ranks* job) {
-  const char* const reason = job != nullptr ? "several ranks" : "--resume";
-  const std::pair<bool, const char*> others[] = {
-      {!arguments.preview.path.empty(), "--preview"},
-      {arguments.backend == Backend::cuda, "--backend cuda"}};
-  for (const auto& [is_given, name] : others)
-    if (is_given)
-      throw UsageError(
-          fmt::format("{}: {} is not made by way of pieces: leave out one of them", reason, name));
-  if (is_standard_output(arguments.output))
-    throw UsageError(fmt::format("{}: pieces lie beside the mesh: name a file with -o", reason));
-}
 
 /// Without ranks by the surface alone, so that the next run finds the same parts.
 std::uint32_t count_parts(const StoreReader& store, ExtractOptions options, const Ranks* job) {
@@ -51,7 +40,9 @@ std::uint32_t count_parts(const StoreReader& store, ExtractOptions options, cons
   const auto pieces = [&](std::uint64_t size) {
     return std::max<std::uint64_t>(1, (blocks + size - 1) / size);
   };
-  std::uint64_t parts = std::min(pieces(kBlocksOfPiece), kMaxPieces);
+  const bool on_device = options.backend == Backend::cuda;
+  std::uint64_t parts =
+      std::min(pieces(on_device ? kBlocksOfPieceOnDevice : kBlocksOfPiece), kMaxPieces);
   if (job != nullptr) {
     const auto for_all = kPiecesOfRank * static_cast<std::uint64_t>(job->size());
     parts = std::max(parts, std::min({for_all, pieces(kFewestBlocks), std::uint64_t{kMaxParts}}));
@@ -62,9 +53,10 @@ std::uint32_t count_parts(const StoreReader& store, ExtractOptions options, cons
 /// What pieces took, as numbers that ranks can add up.
 struct PieceSums {
   std::uint64_t kept = 0, vertices = 0, triangles = 0, degenerate = 0;
-  std::uint64_t bricks_read = 0, brick_reads = 0, bytes_read = 0, search_bytes = 0;
+  std::uint64_t bricks_read = 0, brick_reads = 0, bytes_read = 0, search_bytes = 0, launches = 0;
   double seconds = 0, plan_seconds = 0, decode_seconds = 0, surface_seconds = 0, search_seconds = 0;
   StageReport read = {}, decode = {}, surface = {}, sink = {};
+  StageReport upload = {}, gather = {}, kernel = {}, download = {};
 };
 
 void add(const StageReport& from, StageReport& to) {
@@ -81,6 +73,7 @@ void add(const PieceSums& from, PieceSums& to) {
   to.brick_reads += from.brick_reads;
   to.bytes_read += from.bytes_read;
   to.search_bytes += from.search_bytes;
+  to.launches += from.launches;
   to.seconds += from.seconds;
   to.plan_seconds += from.plan_seconds;
   to.decode_seconds += from.decode_seconds;
@@ -90,6 +83,10 @@ void add(const PieceSums& from, PieceSums& to) {
   add(from.decode, to.decode);
   add(from.surface, to.surface);
   add(from.sink, to.sink);
+  add(from.upload, to.upload);
+  add(from.gather, to.gather);
+  add(from.kernel, to.kernel);
+  add(from.download, to.download);
 }
 
 PieceSums sums_of(const PieceReport& piece) {
@@ -102,6 +99,7 @@ PieceSums sums_of(const PieceReport& piece) {
           .brick_reads = r.brick_reads,
           .bytes_read = r.bytes_read,
           .search_bytes = r.search_bytes,
+          .launches = r.launches,
           .seconds = r.seconds,
           .plan_seconds = r.plan_seconds,
           .decode_seconds = r.decode_seconds,
@@ -110,7 +108,11 @@ PieceSums sums_of(const PieceReport& piece) {
           .read = r.read,
           .decode = r.decode,
           .surface = r.surface,
-          .sink = r.sink};
+          .sink = r.sink,
+          .upload = r.upload,
+          .gather = r.gather,
+          .kernel = r.kernel,
+          .download = r.download};
 }
 
 void put_sums(const PieceSums& sums, ExtractReport& r) {
@@ -118,6 +120,7 @@ void put_sums(const PieceSums& sums, ExtractReport& r) {
   r.brick_reads = sums.brick_reads;
   r.bytes_read = sums.bytes_read;
   r.search_bytes = sums.search_bytes;
+  r.launches = sums.launches;
   r.plan_seconds = sums.plan_seconds;
   r.decode_seconds = sums.decode_seconds;
   r.surface_seconds = sums.surface_seconds;
@@ -126,6 +129,10 @@ void put_sums(const PieceSums& sums, ExtractReport& r) {
   r.decode = sums.decode;
   r.surface = sums.surface;
   r.sink = sums.sink;
+  r.upload = sums.upload;
+  r.gather = sums.gather;
+  r.kernel = sums.kernel;
+  r.download = sums.download;
 }
 
 /// Whether the ranks can write their pieces of the mesh as they are.
@@ -207,6 +214,14 @@ class PieceWork {
   void take(const PieceReport& piece) {
     made_.report.active_bricks = piece.surface.active_bricks;
     made_.report.index = piece.surface.index;
+    made_.report.backend = piece.surface.backend;
+    made_.report.device = piece.surface.device;
+    made_.report.gpu_refusal = piece.surface.gpu_refusal;
+    made_.report.device_bytes = std::max(made_.report.device_bytes, piece.surface.device_bytes);
+    made_.report.device_bytes_in_use =
+        std::max(made_.report.device_bytes_in_use, piece.surface.device_bytes_in_use);
+    made_.report.pinned_bytes = std::max(made_.report.pinned_bytes, piece.surface.pinned_bytes);
+    made_.report.pool_bricks = std::max(made_.report.pool_bricks, piece.surface.pool_bricks);
     add(sums_of(piece), sums_);
   }
 
@@ -283,9 +298,9 @@ void check_outputs_of(const ExtractArguments& arguments,
 CommandOutput make_by_pieces(const ExtractArguments& arguments,
                              const std::vector<ExtractedSurface>& surfaces,
                              const StoreReader& store, Ranks* job, Console& console) {
-  check_piece_arguments(arguments, job);
+  check_piece_arguments(arguments, job != nullptr ? "several ranks" : "--resume");
   check_outputs_of(arguments, surfaces, store, job);
-  if (arguments.resume || job == nullptr)
+  if (job == nullptr || (arguments.resume && job->rank() == 0))
     set_interrupt_note([] { return "the same command goes on with the pieces that are whole"; });
   CommandOutput result;
   std::vector<ExtractReport> reports;

@@ -34,11 +34,10 @@ void check_part_arguments(const ExtractArguments& arguments) {
     if (is_given)
       throw UsageError(
           fmt::format("--part: {} is for the whole mesh: give it to 'isobrick merge'", name));
-  const std::pair<bool, const char*> others[] = {
-      {arguments.labels.has_value(), "--labels"},
-      {!arguments.preview.path.empty(), "--preview"},
-      {arguments.estimate, "--estimate"},
-      {arguments.backend == Backend::cuda, "--backend cuda"}};
+  const std::pair<bool, const char*> others[] = {{arguments.labels.has_value(), "--labels"},
+                                                 {!arguments.preview.path.empty(), "--preview"},
+                                                 {arguments.estimate, "--estimate"},
+                                                 {arguments.devices.size() > 1, "a second device"}};
   for (const auto& [is_given, name] : others)
     if (is_given) throw UsageError(fmt::format("--part: {} is not for parts: leave it out", name));
   refuse_url_output(arguments.output);

@@ -11,6 +11,17 @@ inline constexpr std::string_view kPieceExtension = ".piece";
 /// `isobrick extract --part`: a piece of each isosurface.
 int run_extract_part(const ExtractArguments& given, Console& console);
 
+/// Refuses what is not made by way of pieces; `reason` is why the mesh is.
+void check_piece_arguments(const ExtractArguments& arguments, std::string_view reason);
+
+/// Makes each mesh by way of pieces that several devices share, as the ranks of a job do.
+CommandOutput make_on_devices(const ExtractArguments& arguments,
+                              const std::vector<ExtractedSurface>& surfaces,
+                              const StoreReader& store, Console& console);
+
+/// Of the ranks on a machine each takes a device of its own, as long as there are enough.
+void choose_device(const Ranks& job, ExtractArguments& arguments);
+
 /// Makes each mesh by way of pieces in a folder beside it, which goes once the mesh is there: for
 /// --resume, and for the ranks of a job, where `job` is not null. The pieces that are there are
 /// kept.

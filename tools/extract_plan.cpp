@@ -103,7 +103,7 @@ ExtractOptions common_options(const ExtractArguments& arguments) {
   options.index = arguments.search;
   options.backend = arguments.backend;
   options.gpu_memory = arguments.gpu_memory;
-  options.device = arguments.device;
+  if (!arguments.devices.empty()) options.device = arguments.devices.front();
   options.normals = form_of(arguments).normals;
   return options;
 }

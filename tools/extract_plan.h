@@ -47,7 +47,7 @@ struct ExtractArguments {
   IndexChoice search;
   Backend backend = Backend::automatic;
   std::uint64_t gpu_memory = 0;
-  int device = 0;
+  std::vector<int> devices;  ///< that share the work; none: the first, of ranks one each
   bool estimate = false, force = false, no_space_check = false, resume = false;
   bool mpi = true;  ///< the ranks of a job share the work
 

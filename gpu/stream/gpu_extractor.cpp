@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -41,6 +42,7 @@ struct GpuExtractor::Impl {
   RowSlots slots;
   std::uint64_t launches = 0;
   std::vector<TileWork> whole;
+  std::optional<TileRange> part;
   StreamCollector collector;  // ends first: its thread uses the device
 
   Impl(int id, const Lattice& l, const SurfaceOptions& o, const StreamSizes& sizes, MeshSink& sink,
@@ -105,11 +107,20 @@ struct GpuExtractor::Impl {
                       launch.bricks, table);
   }
 
+  /// Of tiles that come before the part, those at the beginning; else all.
+  std::size_t alike_from_first(std::span<const TileWork> tiles) const {
+    if (!part || part->contains(tiles.front().tile)) return tiles.size();
+    const auto own = std::find_if(tiles.begin(), tiles.end(),
+                                  [&](const TileWork& work) { return part->contains(work.tile); });
+    return static_cast<std::size_t>(own - tiles.begin());
+  }
+
   void submit(std::span<const TileWork> tiles, const BrickLookup& bricks,
               std::shared_ptr<const void> samples) {
     InFlightLaunch& launch = device.in_flight(launches);
     slots.recycle(launch.unused_slots);
     launch.count = static_cast<std::uint32_t>(tiles.size());
+    launch.only_counts = part && !part->contains(tiles.front().tile);
     launch.samples = std::move(samples);
     *reinterpret_cast<LaunchHeader*>(launch.at(0)) = {.item_count = launch.count};
     std::fill_n(reinterpret_cast<OrderState*>(launch.at(device.layout().order)), tiles.size(),
@@ -127,6 +138,11 @@ GpuExtractor::GpuExtractor(int device, const Lattice& lattice, const SurfaceOpti
     : impl_(std::make_unique<Impl>(device, lattice, options, sizes, sink, pool)) {}
 GpuExtractor::~GpuExtractor() = default;
 
+void GpuExtractor::make_part(const TileRange& part, TilePlaces& places) {
+  impl_->part = part;
+  impl_->collector.tell_places(places);
+}
+
 void GpuExtractor::extract(std::span<const TileWork> tiles, const BrickLookup& bricks,
                            const std::shared_ptr<const void>& samples) {
   // Calls may come from any thread.
@@ -134,8 +150,8 @@ void GpuExtractor::extract(std::span<const TileWork> tiles, const BrickLookup& b
   tiles = impl_->all_to_look_at(tiles);
   while (!tiles.empty()) {
     impl_->collector.wait_for_free_launch();
-    const std::size_t parts = ceil_div(tiles.size(), impl_->collector.preferred_tiles());
-    const std::size_t n = ceil_div(tiles.size(), parts);
+    const std::size_t alike = impl_->alike_from_first(tiles);
+    const std::size_t n = ceil_div(alike, ceil_div(alike, impl_->collector.preferred_tiles()));
     impl_->submit(tiles.first(n), bricks, samples);
     tiles = tiles.subspan(n);
   }

@@ -5,6 +5,7 @@
 
 #include "gpu/stream/stream_sizes.h"
 #include "surface/surface_extractor.h"
+#include "surface/tile_places.h"
 
 namespace isobrick::inline v0::gpu {
 
@@ -24,6 +25,9 @@ class GpuExtractor final : public SurfaceExtractor {
                const std::shared_ptr<BrickPool>& pool = nullptr);
   /// Stops; chunks that the sink has not begun to take are dropped unless finish() was called.
   ~GpuExtractor() override;
+
+  /// As CpuExtractor::make_part().
+  void make_part(const TileRange& part, TilePlaces& places);
 
   /// Sends the tiles off. `bricks` lie in the pool or in memory from host_memory(). Throws also
   /// what went wrong on the device.

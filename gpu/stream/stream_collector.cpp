@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include <isobrick/error.h>
+#include "core/morton.h"
 #include "gpu/memory/nvtx_range.h"
 #include "surface/surface_extractor.h"
 
@@ -75,6 +77,7 @@ void StreamCollector::finish() {
 
 SurfaceReport StreamCollector::report() const {
   SurfaceReport report = report_;
+  report.vertices -= vertices_before_;
   report.sink = writer_.report();
   return report;
 }
@@ -126,8 +129,12 @@ std::optional<StreamCollector::Pending> StreamCollector::collect(InFlightLaunch&
   report_.kernel.bytes += launch.count * device_.tile_block_bytes() +
                           mesh_bytes({size.vertices, size.triangles}, normals_);
   check_numbers(size.vertices);
+  if (places_) note_places(launch, launch.only_counts ? 0 : size.left_out);
   std::optional<Pending> next;
-  if (size.vertices > sizes.vertices || size.triangles > sizes.triangles) {
+  if (launch.only_counts) {
+    report_.vertices += size.vertices;
+    vertices_before_ += size.vertices;
+  } else if (size.vertices > sizes.vertices || size.triangles > sizes.triangles) {
     if (pending_) deliver(*pending_);
     pending_.reset();
     repeat_in_parts(launch);
@@ -138,6 +145,23 @@ std::optional<StreamCollector::Pending> StreamCollector::collect(InFlightLaunch&
   launch.samples.reset();
   release_launch(launch.count, size);
   return next;
+}
+
+/// The triangles left out are counted with the first tile.
+void StreamCollector::note_places(InFlightLaunch& launch, std::uint64_t left_out) {
+  const auto* items = reinterpret_cast<const TileItem*>(launch.at(device_.layout().items));
+  OrderState before{0, 0};
+  for (const OrderState& sums : device_.totals_of_tiles(launch)) {
+    const TilePlace place{
+        .code = morton_encode({items->x, items->y, items->z}),
+        .first_vertex = static_cast<std::uint32_t>(report_.vertices + before.vertices),
+        .vertices = static_cast<std::uint32_t>(sums.vertices - before.vertices),
+        .triangles = static_cast<std::uint32_t>(sums.triangles - before.triangles),
+        .degenerate = static_cast<std::uint32_t>(std::exchange(left_out, 0))};
+    if (place.vertices > 0 || place.triangles > 0 || place.degenerate > 0) places_->place(place);
+    before = sums;
+    ++items;
+  }
 }
 
 /// As many tiles at a time as fit, going by the sums that they passed on.

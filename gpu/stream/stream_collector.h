@@ -12,6 +12,7 @@
 #include "gpu/memory/pinned_region.h"
 #include "gpu/stream/stream_device.h"
 #include "surface/chunk_writer.h"
+#include "surface/tile_places.h"
 
 namespace isobrick::inline v0::gpu {
 
@@ -25,6 +26,8 @@ class StreamCollector {
 
   /// Waits until the buffers of the next launch are free. Rethrows what went wrong.
   void wait_for_free_launch();
+  /// From now on `places` hears where the meshes of tiles lie; before the first launch.
+  void tell_places(TilePlaces& places) { places_ = &places; }
   /// A launch was submitted.
   void submitted(InFlightLaunch& launch);
   /// How many tiles a launch may have, going by the meshes so far.
@@ -47,6 +50,7 @@ class StreamCollector {
   void follow();
   InFlightLaunch* next_submitted(bool wait);
   std::optional<Pending> collect(InFlightLaunch& launch);
+  void note_places(InFlightLaunch& launch, std::uint64_t left_out);
   void repeat_in_parts(InFlightLaunch& launch);
   Pending start_download(InFlightLaunch& launch, SurfaceTotals size);
   void deliver(const Pending& pending);
@@ -76,6 +80,8 @@ class StreamCollector {
   // Used by the thread only, until it ends.
   std::optional<Pending> pending_;
   SurfaceReport report_;
+  TilePlaces* places_ = nullptr;
+  std::uint64_t vertices_before_ = 0;  ///< in `report_`, of launches that only count
 
   std::thread thread_;
 };

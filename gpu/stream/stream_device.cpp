@@ -114,6 +114,7 @@ void StreamDevice::launch_kernels(InFlightLaunch& launch, std::uint32_t first, s
   p.epoch = ++epoch_;
   p.number_start = params_.unwelded ? number_ends_ + kEnds : number_start;
   p.number_end = params_.unwelded ? &header->number_end : number_end;
+  if (launch.only_counts) p.vertex_capacity = p.triangle_capacity = 0;
   p.positions = launch.mesh.positions;
   p.normals = launch.mesh.normals;
   p.triangles = launch.mesh.triangles;

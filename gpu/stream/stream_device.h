@@ -29,6 +29,7 @@ struct InFlightLaunch {
   Event extracted{cudaEventBlockingSync}, downloaded{cudaEventBlockingSync};
   Event upload_begin, uploaded, unpack_begin, unpacked, download_begin;
   std::uint32_t count = 0;                  ///< tiles
+  bool only_counts = false;                 ///< its tiles have vertices that others use, no mesh
   std::vector<std::uint32_t> unused_slots;  ///< once this launch is not repeated any more
 
   std::byte* at(std::size_t offset) const { return staging + offset; }

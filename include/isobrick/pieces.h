@@ -25,12 +25,11 @@ struct PieceReport {
 };
 
 /// Makes a part of a surface and writes it to the piece `path`, which has its name once it is
-/// whole. The parts have about as many active blocks each; a part may be empty. Always on the CPU.
+/// whole. The parts have about as many active blocks each; a part may be empty.
 ///
 /// A piece of the same part that is whole is kept: its checksum is compared. A piece that is
 /// damaged or another one is replaced; UsageError where `path` is any other file and `force` is not
-/// set. Throws as extract() does, and UsageError for a part that there is not and for
-/// Backend::cuda.
+/// set. Throws as extract() does, and UsageError for a part that there is not.
 ISOBRICK_API PieceReport extract_piece(const StoreReader& store, const ExtractOptions& options,
                                        Part part, const std::filesystem::path& path,
                                        bool force = false, Progress& progress = no_progress());

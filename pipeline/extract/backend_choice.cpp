@@ -34,7 +34,8 @@ std::size_t plan_gpu_pass(PassRequests requests, const ExtractOptions& options,
 
 bool use_cuda(const ExtractRequest& request, const ExtractOptions& options,
               std::uint64_t active_blocks) {
-  if (options.backend == Backend::cpu || request.part) return false;
+  if (options.backend == Backend::cpu) return false;
+  if (request.part) active_blocks = request.part->active_blocks;
   const bool must = options.backend == Backend::cuda;
   const auto why = gpu::why_unsupported(request.surface);
   if (must && why) throw UsageError("--backend cuda: " + *why);

@@ -53,8 +53,10 @@ class CudaSession final : public GpuSession {
 
   std::unique_ptr<SurfaceExtractor> make_surface(const ExtractRequest& request, std::size_t number,
                                                  MeshSink& sink) override {
-    return std::make_unique<gpu::GpuExtractor>(device_, request.level->lattice, request.surface,
-                                               sizes_[number], sink, pool_);
+    auto surface = std::make_unique<gpu::GpuExtractor>(
+        device_, request.level->lattice, request.surface, sizes_[number], sink, pool_);
+    if (const auto& part = request.part) surface->make_part(part->tiles, *part->places);
+    return surface;
   }
 
   void report(ExtractReport& report) const override {

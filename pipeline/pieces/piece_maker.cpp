@@ -94,8 +94,6 @@ PartPlans PieceMaker::plan(const StoreReader& store, const ExtractOptions& optio
 
 PieceMaker::PieceMaker(const StoreReader& store, const ExtractOptions& options, PartPlans plans)
     : store_(store), options_(options), plans_(std::move(plans)) {
-  if (options.backend == Backend::cuda)
-    throw UsageError("parts of a mesh are made on the CPU: leave out --backend cuda");
   const ExtractRequest request = check_request(store, options, Indexing::welded);
   header_ = mesh_header(request.level->transform, request.level->lattice.extent,
                         request.surface.normals, plans_.bounds);

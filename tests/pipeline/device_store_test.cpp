@@ -8,6 +8,7 @@
 #include <isobrick/device_extractor.h>
 #include <isobrick/error.h>
 #include <isobrick/index_build.h>
+#include <isobrick/pieces.h>
 #include "index/active_tiles.h"
 #include "surface/cpu_extractor.h"
 #include "tests/gpu/compare.h"
@@ -103,6 +104,30 @@ TYPED_TEST(DeviceStoreOf, DegenerateTrianglesAreLeftOut) {
                                .drop_degenerate = true,
                                .threads = 2};
   testing::expect_same(on_cpu(*opened, options), extract_to_device(*opened, options).download());
+}
+
+/// The pieces of a mesh are those of the CPU, and so is the mesh that they become.
+TYPED_TEST(DeviceStoreOf, PiecesAreThoseOfTheCpu) {
+  const auto opened = this->template convert<TypeParam>({150, 140, 131}, BrickCodec::packed);
+  const double isovalue = std::round(this->middle(*opened));
+  for (const bool drop : {false, true})
+    for (std::uint32_t count : {1u, 3u, 7u})
+      for (std::uint32_t number = 1; number <= count; ++number) {
+        SCOPED_TRACE(std::to_string(number) + " of " + std::to_string(count));
+        ExtractOptions options{.isovalue = isovalue,
+                               .normals = number % 2 == 0,
+                               .drop_degenerate = drop,
+                               .threads = 2,
+                               .backend = Backend::cpu};
+        const auto cpu = this->folder_ / "cpu.piece", gpu = this->folder_ / "gpu.piece";
+        extract_piece(*opened, options, {number, count}, cpu, true);
+        options.backend = Backend::cuda;
+        const PieceReport made = extract_piece(*opened, options, {number, count}, gpu, true);
+        EXPECT_EQ(made.surface.backend, "cuda");
+        EXPECT_TRUE(content_of(cpu) == content_of(gpu));
+        std::filesystem::remove(cpu);
+        std::filesystem::remove(gpu);
+      }
 }
 
 TEST_F(DeviceStore, ARegionOfALevel) {

@@ -93,8 +93,6 @@ TEST_F(Pieces, ReplaceNoOtherFile) {
   EXPECT_THROW(extract_piece(reader, {.isovalue = 50}, {1, 2}, folder_ / ""), UsageError);
   EXPECT_THROW(extract_piece(reader, {.isovalue = 50}, {0, 2}, path), UsageError);
   EXPECT_THROW(extract_piece(reader, {.isovalue = 50}, {3, 2}, path), UsageError);
-  EXPECT_THROW(extract_piece(reader, {.isovalue = 50, .backend = Backend::cuda}, {1, 2}, path),
-               UsageError);
 }
 
 /// Ends an extraction in its middle.

@@ -4,9 +4,9 @@
 #include "pipeline/pieces/piece_maker.h"
 #include "pipeline/pieces/piece_reader.h"
 #include "ranks/share_plans.h"
+#include "ranks/thread_ranks.h"
 #include "ranks/write_ply.h"
 #include "tests/pipeline/pieces_fixture.h"
-#include "tests/ranks/thread_ranks.h"
 
 namespace isobrick::test {
 namespace {
@@ -57,7 +57,7 @@ class WritePly : public Pieces {
                        std::uint32_t parts, bool in_memory = false) {
     options.threads = 1;
     const fs::path path = folder_ / "ranks.ply";
-    run_job(ranks, [&](Ranks& job) {
+    run_on_threads(ranks, [&](Ranks& job) {
       const PieceMaker maker(store, options, share_plans(job, [&] {
                                return PieceMaker::plan(store, options, parts);
                              }));
@@ -96,7 +96,7 @@ TEST_F(WritePly, ExchangesBordersOnly) {
   const ExtractOptions options{.isovalue = 50, .threads = 1};
   constexpr std::uint32_t kParts = 12;
   std::atomic<std::uint64_t> received = 0, bound = 0;
-  run_job(4, [&](Ranks& job) {
+  run_on_threads(4, [&](Ranks& job) {
     const PieceMaker maker(reader, options, PieceMaker::plan(reader, options, kParts));
     const std::vector<OwnPiece> own = make(job, maker);
     const std::uint64_t before = job.bytes_received();
@@ -114,7 +114,7 @@ TEST_F(WritePly, RefusesPiecesThatDoNotFit) {
   const StoreReader reader = store(busy_field<std::uint8_t>({130, 97, 60}));
   const StoreReader other = store(busy_field<std::uint16_t>({130, 97, 80}));
   const fs::path path = folder_ / "ranks.ply";
-  run_job(1, [&](Ranks& job) {
+  run_on_threads(1, [&](Ranks& job) {
     const PieceMaker maker = maker_of(reader, 50);
     const PieceMaker stranger = maker_of(other, 60);
     std::vector<OwnPiece> own = make(job, maker);
@@ -133,7 +133,7 @@ TEST_F(WritePly, RefusesPiecesThatDoNotFit) {
 TEST_F(WritePly, LeavesNothingOfADamagedPiece) {
   const StoreReader reader = store(busy_field<std::uint8_t>({130, 97, 60}));
   const fs::path path = folder_ / "ranks.ply";
-  run_job(1, [&](Ranks& job) {
+  run_on_threads(1, [&](Ranks& job) {
     const PieceMaker maker = maker_of(reader, 50);
     const std::vector<OwnPiece> own = make(job, maker);
     std::string bytes = content_of_piece(path_of(3));
@@ -151,7 +151,7 @@ TEST_F(WritePly, LeavesNothingOfADamagedPiece) {
 
 TEST(Deal, GivesEachNumberToOneRank) {
   std::vector<std::atomic<int>> given(100);
-  run_job(4, [&](Ranks& ranks) {
+  run_on_threads(4, [&](Ranks& ranks) {
     deal(ranks, 60, [&](std::uint64_t i) { ++given[i]; });
     deal(ranks, 40, [&](std::uint64_t i) { ++given[60 + i]; });
   });

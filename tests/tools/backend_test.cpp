@@ -100,12 +100,11 @@ TEST_F(Backend, OptionsThatMakeNoSense) {
 
 TEST_F(Backend, WhatHasNoKernelsIsRefusedAndAutoTakesTheCpu) {
   const std::string store = make_store("a");
-  expect_refused(on_cuda(store, {"--drop-degenerate"}), 2,
-                 {"--backend cuda: ", "degenerate", "--backend cpu"});
+  expect_refused(on_cuda(store, {"--cap"}), 2, {"--backend cuda: ", "capped", "--backend cpu"});
   expect_refused(on_cuda(store, {"--topology", "trilinear"}), 2,
                  {"--backend cuda: ", "trilinear", "--backend cpu"});
   EXPECT_FALSE(std::filesystem::exists(path("a.ply")));
-  for (const Arguments& option : {Arguments{"--drop-degenerate"}, {"--topology", "trilinear"}}) {
+  for (const Arguments& option : {Arguments{"--cap"}, {"--topology", "trilinear"}}) {
     Arguments all{"extract", store, "--isovalue", "127.5", "-o", path("auto.ply"), "--force"};
     all.insert(all.end(), option.begin(), option.end());
     EXPECT_EQ(run_json(all)["surfaces"][0]["backend"], "cpu");
@@ -183,6 +182,24 @@ TEST_F(Cuda, DegenerateTrianglesAreLeftOut) {
     EXPECT_GT(cpu["degenerate_triangles"].get<int>(), 0);
     EXPECT_EQ(cuda["degenerate_triangles"], cpu["degenerate_triangles"]);
     EXPECT_TRUE(read_file(path("cpu" + extension)) == read_file(path("cuda" + extension)));
+  }
+}
+
+TEST_F(Cuda, SurfacesByWayOfPiecesAreThoseOfTheCpu) {
+  const std::string store = waves("u16", {"--brick", "32"});
+  compare(store, ".ply", {"--normals", "gradient"}, {"--resume"});
+  compare(store, ".stl", {"--drop-degenerate"}, {"--resume"});
+}
+
+TEST_F(Cuda, SeveralDevicesMakeTheMeshOfOne) {
+  const std::string store = waves("u16", {"--brick", "32"});
+  if (run({"extract", store, "--isovalue", "1", "-o", path("a.ply"), "--backend", "cuda",
+           "--device", "1"})
+          .exit_code != 0)
+    GTEST_SKIP() << "a second device is missing";
+  for (const std::string extension : {".ply", ".glb"}) {
+    const nlohmann::json made = compare(store, extension, {}, {"--device", "0,1"});
+    EXPECT_GT(made["pieces"]["total"].get<int>(), 1);
   }
 }
 

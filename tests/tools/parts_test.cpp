@@ -189,7 +189,7 @@ TEST_F(Parts, RefuseWhatIsForTheWholeMesh) {
   refused({"-o", path("a.piece"), "--format", "stl"}, "give it to 'isobrick merge'");
   refused({"-o", path("a.piece"), "--preset", "print"}, "give it to 'isobrick merge'");
   refused({"-o", path("a.piece"), "--preview", path("a.png")}, "--preview");
-  refused({"-o", path("a.piece"), "--backend", "cuda"}, "--backend cuda");
+  refused({"-o", path("a.piece"), "--device", "0,1"}, "a second device");
   expect_refused(run(extract({"--part", "3/2"})), 2, {"--part", "3"});
   expect_refused(run(extract({"--part", "0/2"})), 2, {"--part", "0"});
   expect_refused(run(extract({"--part", "two"})), 2, {"--part", "such as 3/8"});
