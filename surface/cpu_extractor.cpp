@@ -352,9 +352,9 @@ MeshSize CpuExtractor::max_in_cell(Topology topology) {
 // boundary, which waits at least until the batch is over.
 std::uint64_t CpuExtractor::workspace_bytes(ScalarType type, bool drop_degenerate,
                                             Topology topology, const CapBounds& cap) {
-  const std::uint64_t coincident =
-      sizeof(CoincidentVertices) + kTileRows * kTileSamples * sizeof(SampleVertex) +
-      kTileVolume * sizeof(ActiveCell);
+  const std::uint64_t coincident = sizeof(CoincidentVertices) +
+                                   kTileRows * kTileSamples * sizeof(SampleVertex) +
+                                   kTileVolume * sizeof(ActiveCell);
   // Its lists grow by halves.
   const std::uint64_t cap_bytes =
       cap.faces == 0

@@ -19,6 +19,7 @@ __device__ inline void fetch_owners(const TileShared& s, const TileParams& p) {
   bool wait = true;
   if (p.links) {
     const std::uint32_t link = p.coincident.neighbours[s.item].slots[n];
+    if (link == kNone) return;  // of a part: tiles before it are counted only, and write nothing
     slot = link & ~TileLinks::kSameLaunch;
     wait = (link & TileLinks::kSameLaunch) && !p.tables_known;
   } else {

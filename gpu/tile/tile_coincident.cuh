@@ -133,24 +133,33 @@ __device__ inline std::uint32_t owner_of(const TileShared& s, const NanRows& mis
   return static_cast<std::uint32_t>(13 + first[0] + 3 * first[1] + 9 * first[2]);
 }
 
-/// Divides the used vertices of each row into the tile's own and those of others.
+/// Divides the used vertices of each row into the tile's own and those of others. A row a warp.
 template <int N>
 __device__ inline void find_owners(const TileShared& s, const TileParams& p, const NanRows& missing,
                                    CoincidentWork& w) {
   SampleTable& table = p.coincident.tables[s.tile.slot];
-  for (auto row = static_cast<int>(own_thread()); row < kRowsOfTile; row += N) {
+  const auto lane = static_cast<int>(lane_id());
+  for (auto row = static_cast<int>(warp_id()); row < kRowsOfTile; row += BlockConfig<N>::kWarps) {
     const auto z = static_cast<int>(z_of_row(static_cast<std::uint32_t>(row))), y = row - 33 * z;
-    const unsigned long long used = w.used[row];
-    unsigned long long own = used;
     const bool on_plane = y == 0 || y == 32 || z == 0 || z == 32;
-    for (int x = 0; x < 33 && !p.unwelded && used != 0; x += on_plane ? 1 : 32) {
-      if (!(used >> x & 1u)) continue;
-      const std::uint32_t owner = owner_of(s, missing, w, x, y, z);
-      if (owner == 13) continue;
-      own &= ~(1ull << x);
+    const unsigned long long used = w.used[row];
+    const unsigned long long asked = p.unwelded ? 0 : on_plane ? used : used & (1ull << 32 | 1u);
+    unsigned long long own = used;
+    // Whether another tile makes the vertex on sample x; notes which.
+    const auto is_of_other = [&](bool is_asked, int x) {
+      const std::uint32_t owner = is_asked ? owner_of(s, missing, w, x, y, z) : 13;
+      if (owner == 13) return false;
       w.owners[33 * row + x] = static_cast<std::uint8_t>(owner);
       atomicOr(&w.other_owners, 1u << owner);
+      return true;
+    };
+    if (asked != 0) {
+      own &= ~static_cast<unsigned long long>(
+          __ballot_sync(kFullMask, is_of_other((asked >> lane & 1u) != 0, lane)));
+      const bool last = is_of_other(lane == 0 && (asked >> 32 & 1u) != 0, 32);
+      if (__any_sync(kFullMask, last)) own &= ~(1ull << 32);
     }
+    if (lane > 0) continue;
     table.own[row] = own;
     table.before[row] = static_cast<std::uint16_t>(popc_64(own));
   }

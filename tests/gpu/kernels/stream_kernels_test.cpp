@@ -25,19 +25,21 @@ class Streamed {
         cases_(gpu::make_case_table(world_map(options.transform, options.inside).mirrored)),
         tile_bricks_(static_cast<std::uint32_t>(max_bricks_of_tile(lattice, reach()))) {}
 
-  /// Appends the mesh of some tiles, which come after all before.
-  void extract(std::span<const TileWork> tiles, MeshRoom& room) {
+  /// Appends the mesh of some tiles, which come after all before; with `only_counts` just numbers
+  /// their vertices.
+  void extract(std::span<const TileWork> tiles, MeshRoom& room, bool only_counts = false) {
     count_ = static_cast<std::uint32_t>(tiles.size());
     find_bricks(tiles);
     link_all(tiles);
     unpack();
     gpu::TileParams p = params();
     room.give(p);
-    p.positions += vertices_;
-    p.normals += vertices_;
+    p.positions += vertices_ - before_;
+    p.normals += vertices_ - before_;
     p.triangles += triangles_;
-    p.vertex_capacity -= vertices_;
+    p.vertex_capacity -= vertices_ - before_;
     p.triangle_capacity -= triangles_;
+    if (only_counts) p.vertex_capacity = p.triangle_capacity = 0;
     std::uint32_t ticket = 0;
     gpu::SurfaceTotals totals{};
     std::vector<gpu::OrderState> order(tiles.size());
@@ -58,7 +60,10 @@ class Streamed {
                         p, cases_);
     slots_.recycle(unused_);
     vertices_ += totals.vertices;
-    triangles_ += totals.triangles;
+    if (only_counts)
+      before_ += totals.vertices;
+    else
+      triangles_ += totals.triangles;
     left_out_ += totals.left_out;
     EXPECT_EQ(end, vertices_);
   }
@@ -147,6 +152,7 @@ class Streamed {
   gpu::CaseTable cases_;
   std::uint32_t tile_bricks_, count_ = 0, epoch_ = 0;
   std::uint64_t vertices_ = 0, triangles_ = 0, left_out_ = 0;
+  std::uint64_t before_ = 0;  ///< vertices that are numbered only
   std::vector<gpu::BrickBox> boxes_;
   std::vector<std::uint64_t> addresses_;
   std::vector<std::byte> sent_;
@@ -237,6 +243,38 @@ TYPED_TEST(StreamKernels, DegenerateTrianglesAreLeftOut) {
   const auto coarse = TestFields<TypeParam>::coarse({67, 41, 70}, 7);
   for (const std::size_t tiles : {1u, 100u}) compare_field(coarse, tiles);
   compare_field(TestFields<TypeParam>::at_a_corner(6), 3);
+}
+
+struct NoPlaces final : TilePlaces {
+  void place(const TilePlace&) override {}
+};
+
+/// Tiles before the part that it needs are counted, and lack those before them.
+TYPED_TEST(StreamKernels, APartOfTheTiles) {
+  const auto field = TestFields<TypeParam>::coarse({97, 41, 70}, 7);
+  const Lattice lattice{field.extent, {16, 40, 23}, scalar_type_of<TypeParam>};
+  const DenseBricks bricks(lattice, field.samples.data());
+  for (const bool drop : {false, true})
+    for (const std::uint64_t begin : {1u, 5u}) {
+      SurfaceOptions options;
+      options.isovalue = TestFixture::kMid;
+      options.roi = lattice.box();
+      options.drop_degenerate = drop;
+      const TileRange part{begin, begin + 4, drop, lattice.tiles()};
+      std::vector<TileWork> tiles = active_tiles(field, options.isovalue);
+      std::erase_if(tiles, [&](const TileWork& work) { return !part.needs(work.tile); });
+      const auto own = std::ranges::find_if(
+          tiles, [&](const TileWork& work) { return part.contains(work.tile); });
+      NoPlaces places;
+      CpuExtractor cpu(lattice, options, {});
+      cpu.make_part(part, places);
+      tbb::task_arena(1).execute([&] { cpu.extract(tiles, bricks, nullptr); });
+      MeshRoom room(cpu.mesh().positions.size(), cpu.mesh().triangles.size());
+      Streamed<TypeParam> streamed(lattice, bricks, options);
+      if (own != tiles.begin()) streamed.extract({tiles.begin(), own}, room, true);
+      streamed.extract({own, tiles.end()}, room);
+      room.expect(cpu.mesh());
+    }
 }
 
 TEST(StreamKernelsOf, NotANumber) {
