@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <system_error>
+#include <vector>
 
 #include <fmt/format.h>
 
@@ -20,8 +21,13 @@ UploadOptions upload_options(bool force, std::uint64_t memory) {
   return options;
 }
 
-const std::string& checked(const std::string& url) {
+const std::string& of_bucket(const std::string& url) {
   if (!url.starts_with("s3://")) refuse_url_output(url);
+  return url;
+}
+
+const std::string& checked(const std::string& url) {
+  of_bucket(url);
   if (is_zip_name(url))
     throw UsageError(fmt::format(
         "'{}': a zip is not written to a bucket; name the store .zarr, which readers of a bucket "
@@ -32,22 +38,29 @@ const std::string& checked(const std::string& url) {
 
 }  // namespace
 
-BucketOutput::BucketOutput(const std::string& url, bool force, std::uint64_t memory)
-    : upload_(checked(url), upload_options(force, memory)) {
+ScratchFolder::ScratchFolder() {
   const std::string name = (temporary_folder() / "isobrick").string();
   remove_leftovers(name, true);
   temporary_ = create_temporary_folder(name);
 }
 
-BucketOutput::~BucketOutput() {
+ScratchFolder::~ScratchFolder() {
   std::error_code ignored;
   std::filesystem::remove_all(temporary_.path, ignored);
 }
 
-std::filesystem::path BucketOutput::folder() const {
-  return std::filesystem::path(temporary_.path) / "store.zarr";
-}
+BucketOutput::BucketOutput(const std::string& url, bool force, std::uint64_t memory)
+    : upload_(checked(url), upload_options(force, memory)) {}
 
-void BucketOutput::upload(Progress& progress) { upload_.run(folder(), progress); }
+BucketFile::BucketFile(const std::string& url, bool force, std::uint64_t memory)
+    : upload_(of_bucket(url), upload_options(force, memory)) {}
+
+void BucketFile::upload(Progress& progress) {
+  std::vector<std::filesystem::path> files;
+  for (const auto& entry : std::filesystem::directory_iterator(scratch_.path()))
+    files.push_back(entry.path());
+  std::sort(files.begin(), files.end());
+  upload_.run(files, progress);
+}
 
 }  // namespace isobrick::tools

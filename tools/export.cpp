@@ -10,6 +10,7 @@
 
 #include "bricks/zarr/metadata_files.h"
 #include "io/bytes/output_guard.h"
+#include "tools/bucket_output.h"
 #include "tools/format.h"
 #include "tools/input.h"
 #include "tools/isovalues.h"
@@ -86,10 +87,15 @@ void check(const ExportArguments& arguments) {
 
 int run_export(const ExportArguments& arguments, Console& console) {
   check(arguments);
-  const std::string out = arguments.out.empty() ? default_output(arguments) : arguments.out;
+  std::string out = arguments.out.empty() ? default_output(arguments) : arguments.out;
   ExportOptions options = arguments.options;
   options.format = format_of(out, arguments.format);
   if (is_standard_output(out)) console.reserve_output();
+  std::optional<BucketFile> bucket;
+  if (is_url(out)) {
+    bucket.emplace(out, options.force, options.memory);
+    out = bucket->path().string();
+  }
   const std::array<std::filesystem::path, 1> inputs{arguments.input.path};
   check_replaces_no_input(out, inputs);
   if (!is_zarr(arguments.input.path)) check_can_write(out, options.force);
@@ -103,6 +109,10 @@ int run_export(const ExportArguments& arguments, Console& console) {
     options.isovalue = resolve_isovalues(arguments.isovalues, store, console).front();
   options.half_band = arguments.half_band.value_or(options.half_band);
   const std::uint64_t bytes = export_volume(store, out, options, console.progress());
+  if (bucket) {
+    bucket->upload(console.progress());
+    out = arguments.out;
+  }
   if (options.isovalue)
     if (const std::string why = why_out_of_range(store, options.level, *options.isovalue);
         !why.empty())
@@ -152,7 +162,8 @@ void add_export(Program& program) {
       app, arguments->out, "VOLUME",
       "File to write: NRRD if it ends in .nrrd, OpenVDB if in .vdb; raw if in .raw, .bin or "
       "nothing (C order [z, y, x], little endian), with a header .nhdr beside it; the whole store "
-      "if in .zip; - for raw samples, NRRD or a zip on standard output",
+      "if in .zip; - for raw samples, NRRD or a zip on standard output; also s3://BUCKET/NAME.nrrd "
+      "and so on",
       "head.nrrd of head.zarr, or head.vdb with --isovalue");
   add_parsed(app, arguments->format, parse_format,
              {"--format", "raw|nrrd|vdb|zip",

@@ -103,6 +103,16 @@ std::vector<std::string> S3Writer::list() {
   return keys;
 }
 
+bool S3Writer::has(const std::string& key) {
+  const HttpReply reply =
+      fetch(*client_, {.url = url_of(key), .range = ByteRange{0, 1}, .max_body = 1});
+  if (reply.status == 404) return false;
+  // An empty object has no first byte.
+  if (reply.status != 200 && reply.status != 206 && reply.status != 416)
+    refuse(place_.name + '/' + key, reply);
+  return true;
+}
+
 /// Calls `done` with the reply, on the client's thread. What it throws is a failure.
 void S3Writer::send(HttpRequest request, std::function<void(const HttpReply&)> done) {
   const std::uint64_t bytes = request.method == "PUT" ? request.body.size() : 0;

@@ -33,6 +33,8 @@ class S3Writer {
   const std::string& name() const { return place_.name; }
   /// The keys of all objects below the place, without its own.
   std::vector<std::string> list();
+  /// Whether there is such an object.
+  bool has(const std::string& key);
   /// Begins to write an object, and waits for room for its bytes. `progress` hears of bytes that
   /// the server has, of this object and of others.
   void put(const std::string& key, const File& file, Progress& progress);

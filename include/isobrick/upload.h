@@ -34,4 +34,11 @@ ISOBRICK_API std::uint64_t upload_store(const std::filesystem::path& folder, con
                                         const UploadOptions& options = {},
                                         Progress& progress = no_progress());
 
+/// Writes a file as the object s3://BUCKET/PATH/NAME, which appears once it is whole; large files
+/// go in parts. Throws UsageError for another URL, and where the object is there and `force` is not
+/// set; Error where the file cannot be read or the server refuses. Returns the bytes.
+ISOBRICK_API std::uint64_t upload_file(const std::filesystem::path& file, const std::string& url,
+                                       const UploadOptions& options = {},
+                                       Progress& progress = no_progress());
+
 }  // namespace isobrick

@@ -325,7 +325,10 @@ std::uint64_t export_volume(const StoreReader& store, const std::filesystem::pat
     header->publish_with(output);
   else
     output.publish();
-  return output.writer().size();
+  // Samples of a file are written at their places, not appended.
+  const auto samples_bytes =
+      static_cast<std::uint64_t>(volume(box.extent())) * level.lattice.sample_bytes();
+  return output.writer().size() + (streamed ? 0 : samples_bytes);
 }
 
 }  // namespace isobrick

@@ -178,6 +178,57 @@ TEST_F(Bucket, WhatIsThereIsReplacedByForceOnly) {
   expect_no_leftovers();
 }
 
+TEST_F(Bucket, TakesExportedFiles) {
+  ASSERT_EQ(run(small(path("here.zarr"))).exit_code, 0);
+  for (const std::string name : {"a.nrrd", "a.raw", "a.vdb", "a.zarr.zip"}) {
+    SCOPED_TRACE(name);
+    const std::string url = "s3://bucket/exports/" + name;
+    ASSERT_EQ(run({"export", path("here.zarr"), path(name), "-q"}).exit_code, 0);
+    const Outcome outcome = with_bucket({"export", path("here.zarr"), url, "--json"});
+    ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+    const nlohmann::json made = nlohmann::json::parse(outcome.out);
+    EXPECT_EQ(made.at("output"), url);
+    EXPECT_EQ(made.at("bytes_out"), fs::file_size(path("objects/exports/" + name)));
+    // OpenVDB gives each file an identifier of its own.
+    if (name != "a.vdb") {
+      EXPECT_TRUE(read_file(path("objects/exports/" + name)) == read_file(path(name)));
+    }
+    const std::size_t before = lines("written").size();
+    expect_refused(with_bucket({"export", path("here.zarr"), url}), 2, {url, "--force"});
+    EXPECT_EQ(lines("written").size(), before);
+    EXPECT_EQ(with_bucket({"export", path("here.zarr"), url, "-f", "-q"}).exit_code, 0);
+    expect_no_leftovers();
+  }
+  EXPECT_TRUE(read_file(path("objects/exports/a.nhdr")) == read_file(path("a.nhdr")));
+  // What lies beside the file is not replaced either.
+  fs::remove(path("objects/exports/a.raw"));
+  expect_refused(with_bucket({"export", path("here.zarr"), "s3://bucket/exports/a.raw"}), 2,
+                 {"a.nhdr", "--force"});
+  EXPECT_FALSE(fs::exists(path("objects/exports/a.raw")));
+  expect_refused(with_bucket({"export", path("here.zarr"), "s3://bucket/"}), 2,
+                 {"names no object"});
+  expect_refused(with_bucket({"export", path("here.zarr"), "s3://bucket"}), 2, {"names no object"});
+  expect_refused(with_bucket({"export", path("here.zarr"), "https://host/a.nrrd"}), 2, {"URL"});
+  expect_refused(with_bucket({"export", path("here.zarr"), "s3://bucket/b.nrrd"}, "wrong"), 1,
+                 {"s3://bucket/b.nrrd", "403", "credentials"});
+  expect_no_leftovers();
+}
+
+TEST_F(Bucket, LargeExportsGoInParts) {
+  ASSERT_EQ(run(large(path("here.zarr"))).exit_code, 0);
+  ASSERT_EQ(run({"export", path("here.zarr"), path("b.raw"), "-q"}).exit_code, 0);
+  for (const char* bucket : {"bucket", "bucket-busy", "bucket-reset"}) {
+    const Outcome outcome =
+        with_bucket({"export", path("here.zarr"), std::string("s3://") + bucket + "/b.raw",
+                     "--memory", "64M", "--force", "--json"});
+    ASSERT_EQ(outcome.exit_code, 0) << bucket << ": " << outcome.err;
+    EXPECT_TRUE(read_file(path("objects/b.raw")) == read_file(path("b.raw"))) << bucket;
+    EXPECT_LE(nlohmann::json::parse(outcome.out).at("peak_resident_bytes"), 64 << 20) << bucket;
+    expect_no_leftovers();
+  }
+  EXPECT_EQ(server_->get("uploads"), "0 3\n");
+}
+
 TEST_F(Bucket, UrlsThatMakeNoSense) {
   expect_refused(with_bucket(small("s3://bucket")), 2, {"whole bucket"});
   expect_refused(with_bucket(small("s3://bucket/a.zarr.zip")), 2, {"zip"});
