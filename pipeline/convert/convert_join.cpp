@@ -1,7 +1,6 @@
 #include "pipeline/convert/convert_join.h"
 
 #include <algorithm>
-#include <cmath>
 #include <set>
 #include <vector>
 
@@ -11,44 +10,12 @@
 #include "bricks/zarr/store_names.h"
 #include "core/copy_box.h"
 #include "io/bytes/output_folder.h"
+#include "pipeline/check_part.h"
 #include "pipeline/convert/downsample.h"
 #include "pipeline/convert/unit_file.h"
 
 namespace isobrick::inline v0 {
-namespace {
-
 namespace fs = std::filesystem;
-
-/// Adds counts as if their samples had been counted. A wider bin holds whole bins of narrower ones,
-/// so any value of a bin stands for all; the smallest and the largest sample stand for themselves.
-void add_counts(const SampleCounts& from, ValueCounts& to) {
-  const HistogramBins& bins = from.bins;
-  to.add(std::nan(""), bins.not_a_number);
-  to.add(HUGE_VAL, bins.infinite);
-  for (std::size_t i = 0; i < from.counts.size(); ++i) {
-    std::uint64_t count = from.counts[i];
-    if (i + 1 == from.counts.size() && (i > 0 || count > 1)) {
-      to.add(bins.hi, 1);
-      --count;
-    }
-    const double edge =
-        std::ldexp(static_cast<double>(bins.first + static_cast<std::int64_t>(i)), bins.exponent);
-    to.add(std::max(bins.lo, edge), count);
-  }
-}
-
-std::string numbers_text(const std::set<std::uint32_t>& parts) {
-  constexpr std::size_t shown = 8;
-  std::string text;
-  std::size_t count = 0;
-  for (const std::uint32_t part : parts) {
-    if (++count > shown) return text + fmt::format(" and {} more", parts.size() - shown);
-    text += fmt::format("{}{}", count > 1 ? ", " : "", part);
-  }
-  return text;
-}
-
-}  // namespace
 
 /// Level 1, as the parts left it.
 class JoinedParts::Coarser final : public VolumeSource {
@@ -117,8 +84,8 @@ JoinedParts::JoinedParts(const StoreLayout& layout, const fs::path& out, std::ui
     throw UsageError(
         fmt::format("'{}' has no whole part{} {}; convert the same input with the same options and "
                     "--part {}/{}",
-                    units_.folder().string(), missing.size() == 1 ? "" : "s", numbers_text(missing),
-                    *missing.begin(), parts));
+                    units_.folder().string(), missing.size() == 1 ? "" : "s",
+                    numbers_of_parts(missing), *missing.begin(), parts));
   if (!layout.factors.empty()) coarser_ = std::make_unique<Coarser>(layout, *this);
 }
 

@@ -8,9 +8,7 @@
 
 #include <isobrick/error.h>
 #include "bricks/ranges/brick_checksums.h"
-#include "bricks/ranges/item_array.h"
 #include "bricks/ranges/range_array.h"
-#include "bricks/ranges/stored_ranges.h"
 #include "bricks/storage/open_storage.h"
 #include "bricks/store_entries.h"
 #include "io/bytes/exchange.h"
@@ -59,10 +57,55 @@ void discard_unfinished(const StoreReader& store) {
   });
 }
 
-/// Bytes for the samples of a piece: what the budget leaves.
-/// `others` go for what decoding takes beyond bricks; the caller has taken them off.
-std::uint64_t piece_bytes(const LevelInfo& level, std::uint64_t memory, std::uint64_t others,
-                          int threads) {
+}  // namespace
+
+LevelRangeOutput::LevelRangeOutput(const StoreReader& store, int level, Publisher& publisher)
+    : LevelRangeOutput(store.info().levels[static_cast<std::size_t>(level)].lattice,
+                       additions_of(store), level, publisher) {}
+
+LevelRangeOutput::LevelRangeOutput(const Lattice& lattice, const fs::path& root, int level,
+                                   Publisher& publisher)
+    : blocks_(partial(root / block_range_folder("", level)), lattice.blocks(),
+              range_array_metadata(lattice.blocks(), lattice.type), publisher),
+      bricks_(partial(root / brick_range_folder("", level)), lattice.bricks(),
+              range_array_metadata(lattice.bricks(), lattice.type), publisher),
+      checksums_(partial(root / brick_checksum_folder("", level)), lattice.bricks(),
+                 checksum_array_metadata(lattice.bricks()), publisher) {}
+
+RangeChecksums LevelRangeOutput::finish() {
+  return {
+      .bricks = *bricks_.finish(), .blocks = *blocks_.finish(), .content = *checksums_.finish()};
+}
+
+void replace_ranges(const StoreReader& store, const FillRanges& fill, ValueCounts& counts) {
+  Publisher publisher(store.storage()->local_path());
+  const StoreEntries entries = StoreEntries::of(store.info().levels);
+  for_each_added_folder(store, [&](const fs::path& folder, const fs::path& place) {
+    check_replaceable(folder, entries, place);
+    check_replaceable(partial(folder), entries, place);
+    publisher.folder().remove_folder(partial(folder));  // of a run that was interrupted
+  });
+  StoredRanges stored{
+      .may_have_nan = false, .image_crc32c = store.info().metadata_crc32c, .levels = {}};
+  for (int level = 0; level < static_cast<int>(store.info().levels.size()); ++level) {
+    LevelRangeOutput output(store, level, publisher);
+    stored.may_have_nan |= fill(level, output);
+    stored.levels.push_back(output.finish());
+  }
+  stored.histogram = write_histogram(partial(additions_of(store) / histogram_folder("")),
+                                     counts.counts(), publisher);
+  publisher.wait();
+  for_each_added_folder(store, [&](const fs::path& folder, const fs::path& place) {
+    publisher.folder().replace_folder(partial(folder), folder);
+    check_replaceable(set_aside_name(folder), entries, place);
+    publisher.folder().remove_folder(set_aside_name(folder));  // what a kill may have left
+  });
+  publisher.write(additions_of(store) / ranges_file(""), to_json(stored));
+  publisher.wait();
+}
+
+std::uint64_t range_piece_bytes(const LevelInfo& level, std::uint64_t memory, std::uint64_t others,
+                                int threads) {
   const Lattice& lattice = level.lattice;
   const std::uint64_t brick = lattice.brick_bytes();
   // A brick being decoded: itself and its encoded bytes, once a thread.
@@ -80,78 +123,47 @@ std::uint64_t piece_bytes(const LevelInfo& level, std::uint64_t memory, std::uin
   return std::min(memory - fixed, kEnoughForAPiece);
 }
 
-/// Writes the arrays of a level beside their places, and their checksums into `stored`. With level
-/// 0 goes the histogram.
-void write_ranges(const StoreReader& store, int level, std::uint64_t bytes, Publisher& publisher,
-                  Progress& progress, StoredRanges& stored) {
-  const Lattice& lattice = store.info().levels[static_cast<std::size_t>(level)].lattice;
-  const fs::path root = additions_of(store);
-  const Int3 block_count = lattice.blocks(), brick_count = lattice.bricks();
-  ItemArrayWriter blocks(partial(root / block_range_folder("", level)), block_count,
-                         range_array_metadata(block_count, lattice.type), publisher);
-  ItemArrayWriter bricks(partial(root / brick_range_folder("", level)), brick_count,
-                         range_array_metadata(brick_count, lattice.type), publisher);
-  ItemArrayWriter checksums(partial(root / brick_checksum_folder("", level)), brick_count,
-                            checksum_array_metadata(brick_count), publisher);
-  const auto ranges = make_level_ranges(lattice);
-  const auto counts = level == 0 ? make_value_counts(lattice.type) : nullptr;
-  scan_level(
-      store, level, static_cast<std::size_t>(bytes), *ranges, nullptr,
-      [&](Box3 items, std::span<const std::byte> pairs) { blocks.put(items, pairs); },
-      [&](Box3 items, std::span<const std::byte> pairs) { bricks.put(items, pairs); },
-      [&](std::uint64_t done) { progress.advance(done); },
-      [&](Int3 b, std::uint32_t checksum) {
-        checksums.put({b, b + Int3{1, 1, 1}}, std::as_bytes(std::span(&checksum, 1)));
-      },
-      counts.get());
-  stored.levels.push_back(
-      {.bricks = *bricks.finish(), .blocks = *blocks.finish(), .content = *checksums.finish()});
-  stored.may_have_nan |= ranges->has_nan();
-  if (counts)
-    stored.histogram =
-        write_histogram(partial(root / histogram_folder("")), counts->counts(), publisher);
-}
-
-}  // namespace
-
 void add_ranges(const StoreReader& store, std::uint64_t memory, int threads, Progress& progress) {
   const StoreInfo& info = store.info();
-  const auto levels = static_cast<int>(info.levels.size());
   const std::uint64_t others = decode_extra(info, threads);
+  std::vector<std::uint64_t> piece_bytes;
   std::uint64_t total = 0;
   for (const LevelInfo& level : info.levels) {
-    piece_bytes(level, memory, others, threads);
+    piece_bytes.push_back(range_piece_bytes(level, memory, others, threads));
     total +=
         static_cast<std::uint64_t>(volume(level.lattice.extent)) * level.lattice.sample_bytes();
   }
-  Publisher publisher(store.storage()->local_path());
-  const StoreEntries entries = StoreEntries::of(info.levels);
-  for_each_added_folder(store, [&](const fs::path& folder, const fs::path& place) {
-    check_replaceable(folder, entries, place);
-    check_replaceable(partial(folder), entries, place);
-    publisher.folder().remove_folder(partial(folder));  // of a run that was interrupted
-  });
+  const auto counts = make_value_counts(info.type);
   progress.begin("ranges", total);
-  StoredRanges stored{.may_have_nan = false, .image_crc32c = info.metadata_crc32c, .levels = {}};
-  for (int level = 0; level < levels; ++level)
-    write_ranges(store, level,
-                 piece_bytes(info.levels[static_cast<std::size_t>(level)], memory, others, threads),
-                 publisher, progress, stored);
-  publisher.wait();
+  replace_ranges(
+      store,
+      [&](int level, LevelRangeOutput& output) {
+        const auto at = static_cast<std::size_t>(level);
+        const auto ranges = make_level_ranges(info.levels[at].lattice);
+        scan_level(
+            store, level, static_cast<std::size_t>(piece_bytes[at]), *ranges,
+            [&](Box3 items, std::span<const std::byte> pairs) { output.put_blocks(items, pairs); },
+            [&](Box3 items, std::span<const std::byte> pairs) { output.put_bricks(items, pairs); },
+            {.checksum =
+                 [&](Int3 b, std::uint32_t checksum) {
+                   output.put_checksums({b, b + Int3{1, 1, 1}}, std::span(&checksum, 1));
+                 },
+             .counts = level == 0 ? counts.get() : nullptr,
+             .advance = [&](std::uint64_t done) { progress.advance(done); }});
+        return ranges->has_nan();
+      },
+      *counts);
   progress.end();
-  for_each_added_folder(store, [&](const fs::path& folder, const fs::path& place) {
-    publisher.folder().replace_folder(partial(folder), folder);
-    check_replaceable(set_aside_name(folder), entries, place);
-    publisher.folder().remove_folder(set_aside_name(folder));  // what a kill may have left
-  });
-  publisher.write(additions_of(store) / ranges_file(""), to_json(stored));
-  publisher.wait();
 }
 
-UniqueFd lock_store(const fs::path& store) {
+void check_can_add(const fs::path& store) {
   if (is_zip(store))
     throw UsageError(fmt::format(
         "'{}' is a zip, which cannot be changed: unpack it, and name the folder", store.string()));
+}
+
+UniqueFd lock_store(const fs::path& store) {
+  check_can_add(store);
   UniqueFd lock = OutputFolder(store).make_folder(store / "isobrick");
   if (::flock(lock.get(), LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK)
     throw Error(fmt::format("another process is adding to '{}'", store.string()));

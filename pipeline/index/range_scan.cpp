@@ -5,7 +5,9 @@
 #include <algorithm>
 #include <atomic>
 #include <limits>
+#include <optional>
 
+#include <isobrick/error.h>
 #include "bricks/ranges/range_format.h"
 #include "index/row_ranges.h"
 
@@ -39,9 +41,11 @@ struct Samples {
   const T* at(Int3 p) const { return data + linear_index(p - box.lo, box.extent()); }
 };
 
-/// Merges the samples with y in `ys` and z in `zs` into one row of items. Whether any is NaN.
+/// Merges the samples with y in `ys` and z in `zs` into one row of items, which begins with item
+/// `row_begin`. Whether any is NaN.
 template <class T>
-bool merge_item_row(const Samples<T>& in, Span ys, Span zs, Index edge, ValueRange<T>* row) {
+bool merge_item_row(const Samples<T>& in, Span ys, Span zs, Index edge, Index row_begin,
+                    ValueRange<T>* row) {
   const Index items_at_once = std::max<Index>(1, static_cast<Index>(kRowBytes / sizeof(T)) / edge);
   ColumnRanges<T> columns;
   bool has_nan = false;
@@ -59,7 +63,7 @@ bool merge_item_row(const Samples<T>& in, Span ys, Span zs, Index edge, ValueRan
                             .plane_stride = in.plane_stride()});
     for (Index i = first; i <= last; ++i) {
       const Span xs = samples_seen(i, in.box.lo.x, in.box.hi.x, edge);
-      row[i].include(columns.over(xs.first - x0, xs.last - x0));
+      row[i - row_begin].include(columns.over(xs.first - x0, xs.last - x0));
     }
   }
   return has_nan;
@@ -79,13 +83,20 @@ void canonicalise_zeros(std::vector<ValueRange<T>>& ranges) {
 }  // namespace
 
 template <class T>
-RangeScanner<T>::RangeScanner(Int3 extent, Int3 edge)
-    : extent_(extent), edge_(edge), items_(ceil_div(extent, edge)) {}
+RangeScanner<T>::RangeScanner(Box3 part, Int3 edge) : edge_(edge), end_(part.hi.z) {
+  for (int axis = 0; axis < 3; ++axis) {
+    const Span seen = items_seeing(part.lo[axis], part.hi[axis], edge[axis]);
+    items_.lo[axis] = seen.first;
+    items_.hi[axis] = seen.last + 1;
+  }
+  first_open_ = items_.lo.z;
+}
 
 template <class T>
 typename RangeScanner<T>::Layer& RangeScanner<T>::layer(Index z) {
+  const Int3 e = items_.extent();
   while (first_open_ + static_cast<Index>(open_.size()) <= z)
-    open_.emplace_back(static_cast<std::size_t>(items_.x * items_.y));
+    open_.emplace_back(static_cast<std::size_t>(e.x * e.y));
   return open_[static_cast<std::size_t>(z - first_open_)];
 }
 
@@ -102,21 +113,34 @@ void RangeScanner<T>::add(Box3 box, const T* samples) {
     const Index j = rows.first + task % row_count, k = layers.first + task / row_count;
     Layer& out = open_[static_cast<std::size_t>(k - first_open_)];
     if (merge_item_row(in, samples_seen(j, box.lo.y, box.hi.y, edge_.y),
-                       samples_seen(k, box.lo.z, box.hi.z, edge_.z), edge_.x,
-                       out.data() + j * items_.x))
+                       samples_seen(k, box.lo.z, box.hi.z, edge_.z), edge_.x, items_.lo.x,
+                       out.data() + (j - items_.lo.y) * items_.extent().x))
       found = true;
   });
   has_nan_ |= found;
 }
 
 template <class T>
+void RangeScanner<T>::merge(Box3 items, std::span<const ValueRange<T>> ranges) {
+  if (items.lo.z < first_open_ || intersect(items, items_) != items)
+    throw Error("ranges of a part lie where no more are expected");
+  Layer& out = layer(items.lo.z);
+  auto from = ranges.begin();
+  for (Index y = items.lo.y; y < items.hi.y; ++y) {
+    auto to = out.begin() + (y - items_.lo.y) * items_.extent().x + items.lo.x - items_.lo.x;
+    for (Index x = items.lo.x; x < items.hi.x; ++x) (to++)->include(*from++);
+  }
+}
+
+template <class T>
 void RangeScanner<T>::close(Index z1, const RangeEmit& emit) {
-  const bool all = z1 >= extent_.z;
+  const bool all = z1 >= end_;
   // A layer is complete once the first plane of the next one has been merged.
-  while (first_open_ < items_.z && (all || (first_open_ + 1) * edge_.z < z1)) {
+  while (first_open_ < items_.hi.z && (all || (first_open_ + 1) * edge_.z < z1)) {
     Layer& done = layer(first_open_);
     canonicalise_zeros(done);
-    emit({{0, 0, first_open_}, {items_.x, items_.y, first_open_ + 1}},
+    const Int3 lo = items_.lo, hi = items_.hi;
+    emit({{lo.x, lo.y, first_open_}, {hi.x, hi.y, first_open_ + 1}},
          std::as_bytes(std::span(done)));
     open_.pop_front();
     ++first_open_;
@@ -173,10 +197,11 @@ class BricksFromBlocks {
 template <class T>
 class TypedLevelRanges final : public LevelRanges {
  public:
-  explicit TypedLevelRanges(const Lattice& lattice)
-      : blocks_(lattice.extent, kBlock), from_blocks_(lattice) {
+  TypedLevelRanges(const Lattice& lattice, Box3 part) : blocks_(part, kBlock) {
     if (!whole_blocks(lattice.brick))
-      bricks_ = std::make_unique<RangeScanner<T>>(lattice.extent, lattice.brick);
+      bricks_.emplace(part, lattice.brick);
+    else if (part == lattice.box())
+      from_blocks_.emplace(lattice);
   }
 
   void add(Box3 box, const std::byte* samples) override {
@@ -188,24 +213,40 @@ class TypedLevelRanges final : public LevelRanges {
   void close(Index z1, const RangeEmit& blocks, const RangeEmit& bricks) override {
     blocks_.close(z1, [&](Box3 items, std::span<const std::byte> pairs) {
       blocks(items, pairs);
-      if (!bricks_) from_blocks_.add(items.lo.z, pairs, bricks);
+      if (from_blocks_) from_blocks_->add(items.lo.z, pairs, bricks);
     });
     if (bricks_) bricks_->close(z1, bricks);
   }
 
   bool has_nan() const override { return blocks_.has_nan(); }
 
+  void merge_blocks(Box3 items, std::span<const std::byte> pairs) override {
+    blocks_.merge(items, as_ranges(pairs));
+  }
+  void merge_bricks(Box3 items, std::span<const std::byte> pairs) override {
+    if (bricks_) bricks_->merge(items, as_ranges(pairs));
+  }
+
  private:
+  static std::span<const ValueRange<T>> as_ranges(std::span<const std::byte> pairs) {
+    return {reinterpret_cast<const ValueRange<T>*>(pairs.data()),
+            pairs.size() / sizeof(ValueRange<T>)};
+  }
+
   RangeScanner<T> blocks_;
-  BricksFromBlocks<T> from_blocks_;
-  std::unique_ptr<RangeScanner<T>> bricks_;
+  std::optional<BricksFromBlocks<T>> from_blocks_;
+  std::optional<RangeScanner<T>> bricks_;
 };
 
 }  // namespace
 
 std::unique_ptr<LevelRanges> make_level_ranges(const Lattice& lattice) {
+  return make_part_ranges(lattice, lattice.box());
+}
+
+std::unique_ptr<LevelRanges> make_part_ranges(const Lattice& lattice, Box3 part) {
   return visit_scalar(lattice.type, [&](auto tag) -> std::unique_ptr<LevelRanges> {
-    return std::make_unique<TypedLevelRanges<typename decltype(tag)::type>>(lattice);
+    return std::make_unique<TypedLevelRanges<typename decltype(tag)::type>>(lattice, part);
   });
 }
 

@@ -358,6 +358,22 @@ std::unique_ptr<ValueCounts> make_value_counts(ScalarType type) {
   });
 }
 
+void add_counts(const SampleCounts& from, ValueCounts& to) {
+  const HistogramBins& bins = from.bins;
+  to.add(std::nan(""), bins.not_a_number);
+  to.add(HUGE_VAL, bins.infinite);
+  for (std::size_t i = 0; i < from.counts.size(); ++i) {
+    std::uint64_t count = from.counts[i];
+    if (i + 1 == from.counts.size() && (i > 0 || count > 1)) {
+      to.add(bins.hi, 1);
+      --count;
+    }
+    const double edge =
+        std::ldexp(static_cast<double>(bins.first + static_cast<std::int64_t>(i)), bins.exponent);
+    to.add(std::max(bins.lo, edge), count);
+  }
+}
+
 std::size_t value_counts_bytes(ScalarType type, int threads) {
   return visit_scalar(type, [&](auto tag) {
     using T = typename decltype(tag)::type;

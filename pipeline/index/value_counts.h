@@ -25,6 +25,10 @@ class ValueCounts {
 
 std::unique_ptr<ValueCounts> make_value_counts(ScalarType type);
 
+/// Adds counts as if their samples had been counted. A wider bin holds whole bins of narrower ones,
+/// so any value of a bin stands for all; the smallest and the largest sample stand for themselves.
+void add_counts(const SampleCounts& from, ValueCounts& to);
+
 /// Bytes that the ValueCounts of a type take at most while so many threads add to them.
 std::size_t value_counts_bytes(ScalarType type, int threads);
 

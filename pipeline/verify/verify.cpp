@@ -145,10 +145,11 @@ void LevelCheck::run(std::uint64_t piece_bytes, Progress& progress) {
   const auto counts = level_ == 0 ? make_value_counts(lattice_.type) : nullptr;
   scan_level(
       store_, level_, piece_bytes, *ranges,
-      [&](Int3 brick, const std::string& what) { fail(brick, what); },
       [&](Box3 items, std::span<const std::byte> pairs) { compare(true, items, pairs); },
       [&](Box3 items, std::span<const std::byte> pairs) { compare(false, items, pairs); },
-      [&](std::uint64_t done) { progress.advance(done); }, nullptr, counts.get());
+      {.failure = [&](Int3 brick, const std::string& what) { fail(brick, what); },
+       .counts = counts.get(),
+       .advance = [&](std::uint64_t done) { progress.advance(done); }});
   if (counts) compare_histogram(counts->counts());
 }
 

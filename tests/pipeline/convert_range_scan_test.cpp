@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <isobrick/error.h>
 #include "pipeline/index/range_scan.h"
 #include "tests/pipeline/convert_doubles.h"
 
@@ -62,6 +63,48 @@ TYPED_TEST(RangeScan, EqualsBruteForceWhateverThePieces) {
   }
 }
 
+/// Each brick alone, and then all of them.
+TYPED_TEST(RangeScan, RangesOfPartsAreMerged) {
+  using T = TypeParam;
+  const Int3 extent{67, 50, 41};
+  const auto samples = make_samples<T>(extent, 7, true);
+  for (const Index edge : {16, 20, 32, 33}) {
+    const Lattice lattice{extent, {edge, edge, edge}, scalar_type_of<T>};
+    const auto whole = make_level_ranges(lattice);
+    std::size_t compared = 0;
+    const auto compare = [&](Index of_item) {
+      return [&, of_item](Box3 items, std::span<const std::byte> pairs) {
+        const auto* range = reinterpret_cast<const ValueRange<T>*>(pairs.data());
+        for_each_point(items, [&](Int3 item) {
+          EXPECT_EQ(*range++, brute_range(samples, extent, item, of_item));
+          ++compared;
+        });
+      };
+    };
+    std::vector<T> buffer;
+    for (Index z = 0; z < lattice.bricks().z; ++z) {
+      for_each_point({{0, 0, z}, {lattice.bricks().x, lattice.bricks().y, z + 1}}, [&](Int3 b) {
+        const Box3 box = lattice.brick_box(b);
+        buffer.resize(static_cast<std::size_t>(volume(box.extent())));
+        test::copy_box(reinterpret_cast<const std::byte*>(samples.data()), extent, sizeof(T), box,
+                       reinterpret_cast<std::byte*>(buffer.data()));
+        const auto part = make_part_ranges(lattice, box);
+        part->add(box, reinterpret_cast<const std::byte*>(buffer.data()));
+        part->close(
+            box.hi.z, [&](Box3 items, auto pairs) { whole->merge_blocks(items, pairs); },
+            [&](Box3 items, auto pairs) { whole->merge_bricks(items, pairs); });
+      });
+      whole->close(std::min((z + 1) * edge, extent.z), compare(kBlockEdge), compare(edge));
+    }
+    EXPECT_EQ(compared,
+              static_cast<std::size_t>(volume(lattice.blocks()) + volume(lattice.bricks())));
+    // What a damaged part may have.
+    const std::vector<std::byte> pair(2 * sizeof(T));
+    EXPECT_THROW(whole->merge_blocks({{0, 0, 0}, {1, 1, 1}}, pair), Error);
+    EXPECT_THROW(make_level_ranges(lattice)->merge_blocks({{5, 0, 0}, {6, 1, 1}}, pair), Error);
+  }
+}
+
 TYPED_TEST(RangeScan, RowsLongerThanTheCacheWindow) {
   const Int3 extent{9001, 3, 18};
   check_ranges(make_samples<TypeParam>(extent, 3), extent, extent, 64);
@@ -75,7 +118,7 @@ TEST(RangeScanFloats, NothingButNanIsEmpty) {
 
 TEST(RangeScanFloats, ZerosHaveOneSign) {
   std::vector<float> samples(16 * 16 * 16, -0.0f);
-  RangeScanner<float> scanner({16, 16, 16}, {16, 16, 16});
+  RangeScanner<float> scanner({{0, 0, 0}, {16, 16, 16}}, {16, 16, 16});
   scanner.add({{0, 0, 0}, {16, 16, 16}}, samples.data());
   scanner.close(16, [](Box3, std::span<const std::byte> pairs) {
     for (const std::byte b : pairs) EXPECT_EQ(b, std::byte{0});
