@@ -146,6 +146,11 @@ std::optional<BrickLocation> StoreReader::locate(int level, Int3 b) const {
                        place->size};
 }
 
+std::string StoreReader::key_of(int level, Int3 b) const {
+  impl_->check_brick(level, b);
+  return impl_->shard_key(level, impl_->shard_of(level, b));
+}
+
 bool StoreReader::read_brick(int level, Int3 b, std::byte* out) const {
   const auto place = impl_->find(level, b);
   if (!place) return false;

@@ -64,6 +64,16 @@ void IndexChunkWriter::publish() {
   publisher_.publish(std::move(file_), path_);
 }
 
+void rename_index_chunk(File& file, std::size_t parts, const IndexChunkName& from,
+                        const IndexChunkName& to) {
+  const std::uint64_t tail = ShardIndex::encoded_size(parts, true), size = file.size();
+  if (size < tail) throw DamageError(fmt::format("{} bytes are no chunk of an index", size));
+  std::vector<std::byte> bytes(static_cast<std::size_t>(tail));
+  file.read_at(size - tail, bytes);
+  const ShardIndex places = ShardIndex::decode(bytes, true, size - tail, bytes_of(from));
+  file.write_at(size - tail, places.encode(bytes_of(to)));
+}
+
 IndexChunk::IndexChunk(std::shared_ptr<const StoredObject> file, std::size_t parts, bool compressed,
                        const IndexChunkName& name)
     : file_(std::move(file)), compressed_(compressed), size_(file_->size()), places_(parts) {

@@ -60,6 +60,11 @@ class IndexChunkWriter {
   std::uint64_t end_ = 0;
 };
 
+/// Gives a whole chunk, open for reading and writing, another name: only its places are written
+/// anew. Throws DamageError where it has not the name `from`.
+void rename_index_chunk(File& file, std::size_t parts, const IndexChunkName& from,
+                        const IndexChunkName& to);
+
 /// Reads one index chunk. Thread-safe after construction.
 class IndexChunk {
  public:

@@ -88,6 +88,10 @@ class ISOBRICK_API StoreReader {
   /// Where brick `b` is, or nothing when it is absent (all fill value).
   std::optional<BrickLocation> locate(int level, Int3 b) const;
 
+  /// The key of the shard or chunk that brick `b` belongs to, whether it is there or not. Reads
+  /// nothing.
+  std::string key_of(int level, Int3 b) const;
+
   /// Reads, checks and decodes brick `b` into `out` (lattice.brick_bytes(),
   /// native byte order). False when the brick is absent; `out` is untouched then.
   /// Throws DamageError naming level, brick, file and offset, also for a whole brick that is not
