@@ -2,12 +2,14 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <stop_token>
 #include <vector>
 
 #include <isobrick/api.h>
 #include <isobrick/index_kind.h>
 #include <isobrick/lattice.h>
+#include <isobrick/part.h>
 #include <isobrick/progress.h>
 #include <isobrick/selection.h>
 
@@ -28,13 +30,21 @@ struct IndexOptions {
   bool force = false;   ///< replace an index of this kind, only when the new one is whole
   /// Ends the operation with Cancelled, soon after a stop is requested on any thread.
   std::stop_token cancel = {};
+  /// Makes only this part of what samples are read for, in the folder `store` + ".index.parts":
+  /// the work of one of several tasks. What is whole there is kept. Ranges that the store lacks
+  /// are divided by bricks, and with leaves below 16 the index by chunks; of other indices, made
+  /// of ranges alone, a part has nothing to do. `resume` does not matter.
+  std::optional<Part> part = {};
+  /// Makes the index of so many parts that are all there, and what no part makes; 0: of none. The
+  /// store is that of one call without parts. `resume` does not matter.
+  std::uint32_t join = 0;
 };
 
 /// What adding an index did.
 struct IndexReport {
   std::vector<std::uint64_t> level_bytes;  ///< of the index, the finest level first
   std::uint64_t chunks = 0;                ///< chunks of all levels
-  std::uint64_t chunks_kept = 0;           ///< of them, those that resume found done
+  std::uint64_t chunks_kept = 0;           ///< of them, those that an earlier call had made
   bool ranges_added = false;               ///< the store had none, or they were made anew
   double seconds = 0;                      ///< wall time, the ranges included
   double range_seconds = 0;                ///< wall time of the ranges
@@ -55,7 +65,8 @@ ISOBRICK_API void check_index_options(const IndexOptions& options, const Lattice
 /// again. An index grows as KIND.partial beside its place and moves there once it
 /// is whole; until then the store is as it was. Throws UsageError when there is
 /// one and neither `resume` nor `force` is set, or when the budget is too
-/// small (naming the least that does), Error when another process is at it.
+/// small (naming the least that does), Error when another process is at it, and where parts to
+/// join are missing or are of the store as it was before something in it changed.
 ISOBRICK_API IndexReport add_index(const std::filesystem::path& store, const IndexOptions& options,
                                    Progress& progress = no_progress());
 

@@ -57,8 +57,9 @@ std::uint64_t IndexChunkBuilder::min_memory(const Lattice& lattice, Index leaf, 
 }
 
 IndexChunkBuilder::IndexChunkBuilder(const StoreReader& store, int level, const IndexLayout& layout,
-                                     IndexKind kind, std::uint64_t memory, int threads)
-    : store_(store), level_(level), layout_(layout), kind_(kind) {
+                                     IndexKind kind, std::uint64_t memory, int threads,
+                                     IndexInput input)
+    : store_(store), level_(level), layout_(layout), kind_(kind), input_(input) {
   const Lattice& lattice = store.info().levels[static_cast<std::size_t>(level)].lattice;
   const auto fits = [&](Index piece, std::uint64_t batch) {
     return memory_for(lattice, layout.leaf, threads, piece, batch) <= memory;
@@ -79,7 +80,9 @@ class IndexChunkBuilder::Chunk {
         layout_(builder.layout_),
         box_(layout_.bricks_of_chunk(c)),
         encode_(encode),
-        take_(take) {
+        take_(take),
+        ranges_(static_cast<std::size_t>(volume(box_.extent()))) {
+    if (builder.input_ == IndexInput::samples) return;
     const Int3 cell_blocks = ceil_div(layout_.cells(), {kBlockEdge, kBlockEdge, kBlockEdge});
     blocks_ = builder.store_.block_ranges(
         builder.level_,
@@ -91,11 +94,18 @@ class IndexChunkBuilder::Chunk {
  private:
   /// The ranges of the blocks of an index brick, C order of its grid of leaf 16.
   std::vector<ValueRange<T>> block_ranges(Int3 b) const;
-  std::vector<Int3> write_directory() const;
-  void build_from_blocks(const std::vector<Int3>& bricks) const;
-  void build_from_samples(const std::vector<Int3>& bricks) const;
+  /// All index bricks, in Morton order.
+  std::vector<Int3> all_bricks() const;
+  ValueRange<T>& range_of(Int3 b) {
+    return ranges_[static_cast<std::size_t>(linear_index(b - box_.lo, box_.extent()))];
+  }
+  void find_ranges();
+  bool is_active(Int3 b, std::span<const ValueRange<T>> ranges);
+  void write_directory();
+  void build_from_blocks(const std::vector<Int3>& bricks);
+  void build_from_samples(const std::vector<Int3>& bricks);
   template <class Ranges>
-  void write_parts(std::span<const Int3> bricks, const Ranges& ranges_of) const;
+  void write_parts(std::span<const Int3> bricks, const Ranges& ranges_of);
 
   const IndexChunkBuilder& builder_;
   const IndexLayout& layout_;
@@ -103,6 +113,7 @@ class IndexChunkBuilder::Chunk {
   const Encode& encode_;
   const Take& take_;
   RangeTable blocks_;
+  std::vector<ValueRange<T>> ranges_;  ///< of the index bricks, C order
 };
 
 template <class T>
@@ -119,45 +130,62 @@ std::vector<ValueRange<T>> IndexChunkBuilder::Chunk<T>::block_ranges(Int3 b) con
   return ranges;
 }
 
-/// Hands the directory over; the index bricks that can be active, in Morton order.
 template <class T>
-std::vector<Int3> IndexChunkBuilder::Chunk<T>::write_directory() const {
-  std::vector<ValueRange<T>> ranges(static_cast<std::size_t>(volume(box_.extent())));
+std::vector<Int3> IndexChunkBuilder::Chunk<T>::all_bricks() const {
   std::vector<Int3> bricks;
-  for_each_morton(box_.extent(), [&](Int3 p) {
-    ValueRange<T>& range = ranges[static_cast<std::size_t>(linear_index(p, box_.extent()))];
-    for (const ValueRange<T>& block : block_ranges(box_.lo + p)) range.include(block);
-    if (range.lo < range.hi) bricks.push_back(box_.lo + p);
-  });
-  take_(IndexLayout::kDirectory, encode_(build_index<T>(builder_.kind_, ranges, box_.extent())));
+  for_each_morton(box_.extent(), [&](Int3 p) { bricks.push_back(box_.lo + p); });
   return bricks;
 }
 
-/// Makes the parts of `bricks`, a batch at a time; ranges_of(brick) are those of its items.
+/// Those of the index bricks, from those of the blocks.
+template <class T>
+void IndexChunkBuilder::Chunk<T>::find_ranges() {
+  for (const Int3 b : all_bricks())
+    for (const ValueRange<T>& block : block_ranges(b)) range_of(b).include(block);
+}
+
+template <class T>
+void IndexChunkBuilder::Chunk<T>::write_directory() {
+  take_(IndexLayout::kDirectory, encode_(build_index<T>(builder_.kind_, ranges_, box_.extent())));
+}
+
+/// Makes the parts of `bricks`, a batch at a time; ranges_of(brick) are those of its items. Bricks
+/// that cannot be active have none.
 template <class T>
 template <class Ranges>
 void IndexChunkBuilder::Chunk<T>::write_parts(std::span<const Int3> bricks,
-                                              const Ranges& ranges_of) const {
+                                              const Ranges& ranges_of) {
   std::vector<std::vector<std::byte>> parts(std::min(builder_.batch_, bricks.size()));
   for (std::size_t first = 0; first < bricks.size(); first += parts.size()) {
     const std::size_t count = std::min(parts.size(), bricks.size() - first);
     tbb::parallel_for(std::size_t{0}, count, [&](std::size_t i) {
       const Int3 b = bricks[first + i];
       const std::vector<ValueRange<T>> ranges = ranges_of(b);
+      if (!is_active(b, ranges)) return parts[i].clear();
       parts[i] = encode_(build_index<T>(builder_.kind_, ranges, layout_.leaves_of_brick(b)));
     });
     for (std::size_t i = 0; i < count; ++i)
-      take_(layout_.part_of_brick(bricks[first + i]), std::move(parts[i]));
+      if (!parts[i].empty()) take_(layout_.part_of_brick(bricks[first + i]), std::move(parts[i]));
   }
 }
 
+/// Whether an isovalue stabs a brick of these ranges. Where they are the first that is known of it,
+/// they become that of the brick.
 template <class T>
-void IndexChunkBuilder::Chunk<T>::build_from_blocks(const std::vector<Int3>& bricks) const {
+bool IndexChunkBuilder::Chunk<T>::is_active(Int3 b, std::span<const ValueRange<T>> ranges) {
+  ValueRange<T>& of_brick = range_of(b);
+  if (builder_.input_ == IndexInput::samples)
+    for (const ValueRange<T>& range : ranges) of_brick.include(range);
+  return of_brick.lo < of_brick.hi;
+}
+
+template <class T>
+void IndexChunkBuilder::Chunk<T>::build_from_blocks(const std::vector<Int3>& bricks) {
   write_parts(bricks, [&](Int3 b) { return block_ranges(b); });
 }
 
 template <class T>
-void IndexChunkBuilder::Chunk<T>::build_from_samples(const std::vector<Int3>& bricks) const {
+void IndexChunkBuilder::Chunk<T>::build_from_samples(const std::vector<Int3>& bricks) {
   const Box3 volume_box{{0, 0, 0}, layout_.extent};
   std::unique_ptr<std::byte[]> samples;
   std::size_t room = 0;
@@ -177,7 +205,9 @@ void IndexChunkBuilder::Chunk<T>::build_from_samples(const std::vector<Int3>& br
       samples.reset();
       samples = std::make_unique_for_overwrite<std::byte[]>(room = bytes);
     }
-    read_slab(builder_.store_, builder_.level_, seen, samples.get());
+    read_slab(builder_.store_, builder_.level_, seen, samples.get(), nullptr,
+              builder_.input_ == IndexInput::samples ? BrickChecksum([](Int3, std::uint32_t) {})
+                                                     : nullptr);
     const T* typed = reinterpret_cast<const T*>(samples.get());
     write_parts(std::span(bricks).subspan(first, end - first), [&](Int3 b) {
       const Box3 of_brick =
@@ -193,7 +223,15 @@ void IndexChunkBuilder::Chunk<T>::build_from_samples(const std::vector<Int3>& br
 
 template <class T>
 void IndexChunkBuilder::Chunk<T>::run() {
-  const std::vector<Int3> bricks = write_directory();
+  if (builder_.input_ == IndexInput::samples) {
+    build_from_samples(all_bricks());
+    write_directory();
+    return;
+  }
+  find_ranges();
+  write_directory();
+  std::vector<Int3> bricks = all_bricks();
+  std::erase_if(bricks, [&](Int3 b) { return !(range_of(b).lo < range_of(b).hi); });
   if (layout_.leaf == kBlockEdge)
     build_from_blocks(bricks);
   else

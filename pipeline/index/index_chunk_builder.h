@@ -11,9 +11,15 @@
 
 namespace isobrick::inline v0 {
 
+/// What the index of a level is made of.
+enum class IndexInput : std::uint8_t {
+  ranges,  ///< those of the store and, for leaves below 16, samples that its checksums match
+  samples  ///< samples alone, as they are now; for leaves below 16
+};
+
 /// Makes the parts of a level's index chunks from the level's ranges and, for
 /// leaves below 16, from its samples. Bricks whose range no isovalue stabs have
-/// no part and are not read.
+/// no part. Where there are ranges, such bricks are not read.
 class IndexChunkBuilder {
  public:
   /// The least memory for a level of this lattice.
@@ -21,7 +27,7 @@ class IndexChunkBuilder {
 
   /// `memory` is no less than the least.
   IndexChunkBuilder(const StoreReader& store, int level, const IndexLayout& layout, IndexKind kind,
-                    std::uint64_t memory, int threads);
+                    std::uint64_t memory, int threads, IndexInput input = IndexInput::ranges);
 
   /// What becomes of each part; called from any thread.
   using Encode = std::function<std::vector<std::byte>(std::vector<std::byte>)>;
@@ -29,7 +35,7 @@ class IndexChunkBuilder {
   using Take = std::function<void(std::size_t part, std::vector<std::byte>)>;
 
   /// The directory first, then the index bricks in Morton order, whatever the
-  /// memory. Parallel in the caller's arena.
+  /// memory; of samples alone the directory comes last. Parallel in the caller's arena.
   void build(Int3 chunk, const Encode& encode, const Take& take) const;
 
  private:
@@ -40,6 +46,7 @@ class IndexChunkBuilder {
   int level_;
   const IndexLayout& layout_;
   IndexKind kind_;
+  IndexInput input_;
   std::size_t batch_ = 1;  ///< parts made at a time
   Index piece_ = 1;        ///< index bricks along each edge of what is read at a time
 };
