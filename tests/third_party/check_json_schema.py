@@ -88,6 +88,8 @@ def run_commands(check):
     check.run("recode", "recode", "a.zarr", "z.zarr", "--codec", "zstd:5")
     check.run("convert", "convert", "a.nrrd", "auto.zarr", "--codec", "auto")
     check.run("index", "index", "c.zarr", "--kind", "kdtree", "--leaf", "4")
+    check.run("index", "index", "c.zarr", "--kind", "quadtree", "--leaf", "8", "--part", "1/1")
+    check.run("index", "index", "c.zarr", "--kind", "quadtree", "--leaf", "8", "--join", "1")
     for options in ([], ["--stats"]):
         check.run("info", "info", "a.zarr", *options)
         check.run("info", "info", "a.nrrd", *options)

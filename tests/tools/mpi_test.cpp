@@ -134,6 +134,91 @@ TEST_F(Mpi, ConvertMakesTheStoreOfOneProcess) {
   EXPECT_EQ(files(), (std::vector<std::string>{"g.zarr", "one.zarr", "ranks.zarr", "v.raw"}));
 }
 
+class MpiIndex : public Mpi {
+ protected:
+  void SetUp() override {
+    Mpi::SetUp();
+    if (IsSkipped()) return;
+    // Two parts, and two chunks along x. The image is one of another program, without ranges.
+    run_json({"synth", "gyroid", path("x.zarr"), "--dims", "530,200,160", "--type", "u8"});
+    nlohmann::json root = nlohmann::json::parse(read_file(path("x.zarr/zarr.json")));
+    root["attributes"].erase("isobrick");
+    write_file(path("x.zarr/zarr.json"), root.dump());
+    fs::remove_all(path("x.zarr/isobrick"));
+    fs::remove_all(path("g.zarr"));
+  }
+
+  std::string copy_of_store(const std::string& name) {
+    for (const std::string& old : {path(name), path(name + ".index.parts")}) fs::remove_all(old);
+    EXPECT_EQ(run_process({"cp", "-rp", path("x.zarr"), path(name)}).exit_code, 0);
+    return path(name);
+  }
+  void expect_same_stores(const std::string& a, const std::string& b) {
+    EXPECT_EQ(run_process({"diff", "-r", path(a), path(b)}).out, "");
+  }
+};
+
+TEST_F(MpiIndex, IsThatOfOneProcess) {
+  for (const std::string leaf : {"16", "4"}) {
+    const auto one = run_json({"index", copy_of_store("one.zarr"), "--leaf", leaf});
+    for (const int ranks : {1, 3}) {
+      const auto made = mpirun_json(ranks, {"index", copy_of_store("ranks.zarr"), "--leaf", leaf});
+      EXPECT_EQ(made.contains("ranks"), ranks > 1);
+      EXPECT_EQ(made["level_bytes"], one["level_bytes"]);
+      expect_same_stores("ranks.zarr", "one.zarr");
+      EXPECT_EQ(files(), (std::vector<std::string>{"one.zarr", "ranks.zarr", "x.zarr"}));
+    }
+  }
+  // A store that has ranges, and an index to replace.
+  run_json({"index", path("one.zarr"), "--leaf", "8", "--force"});
+  mpirun_json(3, {"index", path("ranks.zarr"), "--leaf", "8", "--force"});
+  expect_same_stores("ranks.zarr", "one.zarr");
+  const Outcome again = mpirun(3, {"index", path("ranks.zarr"), "--leaf", "8"});
+  EXPECT_EQ(again.exit_code, 2);
+  EXPECT_NE(again.err.find("has a octree index; --force"), std::string::npos) << again.err;
+  const Outcome alone =
+      mpirun(2, {"index", path("ranks.zarr"), "--mpi", "off", "--part", "1/1", "--force"});
+  EXPECT_EQ(alone.exit_code, 0) << alone.err;
+}
+
+/// A rank is killed at one of its renames and removals: the job ends, the store has no index and no
+/// ranges or all of them, and the same command goes on.
+TEST_F(MpiIndex, AKilledRankEndsTheJob) {
+  run_json({"index", copy_of_store("one.zarr"), "--leaf", "4"});
+  int killed = 0;
+  for (const int first : {0, 1})
+    for (const int at : {0, 2, 8}) {
+      const Arguments index{"index", copy_of_store("ranks.zarr"), "--leaf", "4", "--threads", "1"};
+      const Arguments kill{"env", std::string("LD_PRELOAD=") + ISOBRICK_KILL_AT_LIBRARY,
+                           fmt::format("ISOBRICK_KILL_AT={}", at)};
+      // mpirun of one rank that is killed and one that is not, in either order.
+      Arguments words = launch(1);
+      words.pop_back();
+      for (const bool is_first : {true, false}) {
+        if (is_first == (first == 0)) words.insert(words.end(), kill.begin(), kill.end());
+        words.push_back(ISOBRICK_PROGRAM);
+        words.insert(words.end(), index.begin(), index.end());
+        if (is_first) words.insert(words.end(), {":", "-n", "1"});
+      }
+      const Outcome outcome = run_process(words);
+      if (outcome.exit_code != 0) {
+        ++killed;
+        EXPECT_EQ(outcome.exit_code, 128 + SIGKILL) << outcome.err;
+        EXPECT_EQ(run({"info", path("ranks.zarr")}).exit_code, 0);
+        if (fs::exists(path("ranks.zarr/isobrick/ranges.json"))) {
+          EXPECT_EQ(run({"verify", path("ranks.zarr")}).exit_code, 0);
+        }
+        const Outcome again = mpirun(2, index);
+        if (again.exit_code != 0) {  // nothing was left to do
+          EXPECT_NE(again.err.find("has a octree index"), std::string::npos) << again.err;
+        }
+      }
+      expect_same_stores("ranks.zarr", "one.zarr");
+      EXPECT_FALSE(fs::exists(path("ranks.zarr.index.parts"))) << at;
+    }
+  EXPECT_GT(killed, 2);
+}
+
 TEST_F(Mpi, AFailureIsReportedOnce) {
   write_file(path("there.ply"), "mine");
   const struct {
