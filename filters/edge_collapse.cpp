@@ -261,14 +261,20 @@ std::vector<Collapse> EdgeCollapse::run(std::size_t least) {
   return collapses;
 }
 
-std::vector<Triangle> collapsed(const TriangleGroup& group, std::span<const Collapse> collapses) {
+std::vector<std::uint32_t> final_vertices(const TriangleGroup& group,
+                                          std::span<const Collapse> collapses) {
   std::vector<std::uint32_t> last(group.vertices.size());
   for (std::uint32_t v = 0; v < last.size(); ++v) last[v] = v;
   // Where a vertex goes later, those that went to it before go too.
   for (std::size_t i = collapses.size(); i-- > 0;) last[collapses[i].from] = last[collapses[i].to];
+  return last;
+}
+
+std::vector<Triangle> collapsed(const TriangleGroup& group,
+                                std::span<const std::uint32_t> final_vertices) {
   std::vector<Triangle> triangles;
   for (const Triangle& t : group.triangles) {
-    const Triangle left{last[t[0]], last[t[1]], last[t[2]]};
+    const Triangle left{final_vertices[t[0]], final_vertices[t[1]], final_vertices[t[2]]};
     if (left[0] != left[1] && left[1] != left[2] && left[2] != left[0]) triangles.push_back(left);
   }
   return triangles;

@@ -111,7 +111,12 @@ class EdgeCollapse {
   std::vector<std::uint32_t> gone_;
 };
 
+/// Which vertex each one of a group becomes by collapses; those that stay become themselves.
+std::vector<std::uint32_t> final_vertices(const TriangleGroup& group,
+                                          std::span<const Collapse> collapses);
+
 /// The triangles of a group that are left after collapses, in their order.
-std::vector<Triangle> collapsed(const TriangleGroup& group, std::span<const Collapse> collapses);
+std::vector<Triangle> collapsed(const TriangleGroup& group,
+                                std::span<const std::uint32_t> final_vertices);
 
 }  // namespace isobrick

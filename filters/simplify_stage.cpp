@@ -9,6 +9,8 @@
 #include <limits>
 #include <utility>
 
+#include "filters/collapse_error.h"
+
 namespace isobrick::inline v0 {
 namespace {
 
@@ -114,12 +116,15 @@ void SimplifyStage::for_each_run(TriangleGroups& groups, F&& f) {
   }
 }
 
+void SimplifyStage::load_positions(TriangleGroup& group) {
+  for (const std::uint32_t v : group.vertices) group.positions.push_back(mesh_.positions()[v]);
+}
+
 /// Finds the collapses of all groups, more than there should be.
 void SimplifyStage::find_collapses(TriangleGroups& groups, double part, double max_distance) {
   collapses_.clear();
   for_each_run(groups, [&](std::size_t, std::vector<TriangleGroup>& loaded) {
-    for (TriangleGroup& group : loaded)
-      for (const std::uint32_t v : group.vertices) group.positions.push_back(mesh_.positions()[v]);
+    for (TriangleGroup& group : loaded) load_positions(group);
     std::vector<std::vector<Collapse>> found(loaded.size());
     in_parallel(loaded, [&](const TriangleGroup& group) {
       const double least = part / kReserve * static_cast<double>(group.triangles.size());
@@ -133,12 +138,29 @@ void SimplifyStage::find_collapses(TriangleGroups& groups, double part, double m
 /// Does the collapses of the smallest errors.
 void SimplifyStage::collapse(TriangleGroups& groups, std::uint64_t all, std::uint64_t wanted) {
   collapses_.select((all - wanted + 1) / 2);  // each takes two triangles away
+  double largest = 0;
   for_each_run(groups, [&](std::size_t first, std::vector<TriangleGroup>& loaded) {
-    for (std::size_t i = 0; i < loaded.size(); ++i)
-      for (const Triangle& t : collapsed(loaded[i], collapses_.load(first + i)))
+    std::vector<std::vector<Collapse>> collapses(loaded.size());
+    for (std::size_t i = 0; i < loaded.size(); ++i) {
+      collapses[i] = collapses_.load(first + i);
+      if (simplification_.measures_error) load_positions(loaded[i]);
+    }
+    std::vector<std::vector<Triangle>> left(loaded.size());
+    std::vector<double> errors(loaded.size());
+    in_parallel(loaded, [&](const TriangleGroup& group) {
+      const auto i = static_cast<std::size_t>(&group - loaded.data());
+      const std::vector<std::uint32_t> last = final_vertices(group, collapses[i]);
+      left[i] = collapsed(group, last);
+      if (simplification_.measures_error) errors[i] = collapse_error(group, last, left[i]);
+    });
+    for (std::size_t i = 0; i < loaded.size(); ++i) {
+      largest = std::max(largest, errors[i]);
+      for (const Triangle& t : left[i])
         mesh_.triangles().push_back(
             {loaded[i].vertices[t[0]], loaded[i].vertices[t[1]], loaded[i].vertices[t[2]]});
+    }
   });
+  error_ += largest;  // passes add up
 }
 
 void SimplifyStage::simplify_all() {

@@ -21,6 +21,7 @@ struct Simplification {
   double max_error = 0;          ///< world units; 0: any
   int threads = 0;               ///< 0: all cores
   Progress* progress = nullptr;  ///< null: nobody hears of the groups
+  bool measures_error = false;   ///< SimplifyStage::error()
 };
 
 /// Passes a simplified mesh on, whatever its size.
@@ -41,6 +42,10 @@ class SimplifyStage final : public FilterStage {
 
   /// Triangles that it aimed at, after finish(); nothing where only the error decides.
   std::optional<std::uint64_t> goal() const { return goal_; }
+  /// How far the mesh that entered is at most from the mesh that left, after finish(), in world
+  /// units: the sum over passes of what their vertices and the centres of their triangles are.
+  /// Simplification::measures_error requests it.
+  double error() const { return error_; }
 
  private:
   std::uint64_t own_bytes() const override {
@@ -54,6 +59,7 @@ class SimplifyStage final : public FilterStage {
   void simplify_all();
   void find_collapses(TriangleGroups& groups, double part, double max_distance);
   void collapse(TriangleGroups& groups, std::uint64_t all, std::uint64_t wanted);
+  void load_positions(TriangleGroup& group);
   template <class F>
   void in_parallel(std::vector<TriangleGroup>& groups, F&& f);
   template <class F>
@@ -71,6 +77,7 @@ class SimplifyStage final : public FilterStage {
   ScratchArray<std::uint32_t> numbers_;  ///< of kept vertices plus 1; 0: not kept
   MeshBounds bounds_;
   std::optional<std::uint64_t> goal_;
+  double error_ = 0;
 };
 
 }  // namespace isobrick

@@ -7,7 +7,9 @@
 #include <random>
 #include <set>
 
+#include "filters/collapse_error.h"
 #include "filters/collapse_spool.h"
+#include "filters/removed_points.h"
 #include "tests/filters/far_triangles.h"
 #include "tests/filters/filter_fixture.h"
 
@@ -65,7 +67,7 @@ TriangleGroup sheet(std::uint32_t n) {
 
 std::vector<Triangle> simplified(const TriangleGroup& group, std::size_t least,
                                  double max_distance = kAnyDistance) {
-  return collapsed(group, EdgeCollapse(group, max_distance).run(least));
+  return collapsed(group, final_vertices(group, EdgeCollapse(group, max_distance).run(least)));
 }
 
 TEST(EdgeCollapse, StopsAtATetrahedron) {
@@ -211,6 +213,68 @@ TEST(CollapseSpool, SelectsTheSmallestErrors) {
   spool.add(third);
   spool.select(1);
   EXPECT_EQ(spool.load(0).front(), third.front());
+}
+
+double error_of(const TriangleGroup& group, std::size_t least) {
+  const std::vector<std::uint32_t> last =
+      final_vertices(group, EdgeCollapse(group, kAnyDistance).run(least));
+  return collapse_error(group, last, collapsed(group, last));
+}
+
+TEST(CollapseError, IsThatOfTheVerticesThatWent) {
+  EXPECT_NEAR(error_of(sheet(60), 1000), 0, 1e-9) << "all stays in the plane";
+  TriangleGroup peak = sheet(4);
+  peak.positions[12].z = 0.5F;
+  EXPECT_EQ(error_of(peak, peak.triangles.size()), 0) << "nothing went";
+  // All inside goes: the border is flat.
+  EXPECT_NEAR(error_of(peak, 0), 0.5, 1e-6);
+}
+
+/// How far points are at most from triangles of a group.
+double farthest(const std::vector<Vec3d>& points, const TriangleGroup& group,
+                const std::vector<Triangle>& triangles) {
+  const auto at = [&](std::uint32_t v) { return to_double(group.positions[v]); };
+  double largest = 0;
+  for (const Vec3d& p : points) {
+    double least = std::numeric_limits<double>::infinity();
+    for (const Triangle& t : triangles)
+      least = std::min(least, squared_distance(p, at(t[0]), at(t[1]), at(t[2])));
+    largest = std::max(largest, least);
+  }
+  return std::sqrt(largest);
+}
+
+TEST(CollapseError, TrianglesWithoutArea) {
+  EXPECT_EQ(error_of(bipyramid(8, 0, 0), 0), 0);
+  // Two corners of what is left are at one place.
+  const TriangleGroup group =
+      group_of({{0.3F, 0, 1}, {0, 0, 0}, {0, 0, 0}, {1, 0, 0}}, {{0, 2, 3}, {1, 2, 3}});
+  const std::vector<std::uint32_t> last{1, 1, 2, 3};
+  EXPECT_NEAR(collapse_error(group, last, collapsed(group, last)), 1, 0.1);
+}
+
+TEST(CollapseError, IsThatOfCentresToo) {
+  std::mt19937 random(4);
+  std::uniform_real_distribution<float> shift(-0.2F, 0.2F);
+  int of_centres_alone = 0;
+  for (int round = 0; round < 200; ++round) {
+    TriangleGroup group = bipyramid(12, 1, 1);
+    for (Vec3f& p : group.positions) p = p + Vec3f{shift(random), shift(random), shift(random)};
+    const std::vector<std::uint32_t> last =
+        final_vertices(group, EdgeCollapse(group, kAnyDistance).run(20));
+    const std::vector<Triangle> left = collapsed(group, last);
+    std::vector<Vec3d> vertices, centres;
+    for (const Vec3f& p : group.positions) vertices.push_back(to_double(p));
+    for (const Triangle& t : group.triangles)
+      centres.push_back((vertices[t[0]] + vertices[t[1]] + vertices[t[2]]) * (1.0 / 3));
+    const double of_vertices = farthest(vertices, group, left),
+                 of_centres = farthest(centres, group, left);
+    of_centres_alone += of_centres > 1.01 * of_vertices;
+    const double error = collapse_error(group, last, left);
+    EXPECT_GE(error, std::max(of_vertices, of_centres) * (1 - 1e-9)) << "round " << round;
+    EXPECT_LE(error, 2 * std::max(of_vertices, of_centres)) << "round " << round;
+  }
+  EXPECT_GT(of_centres_alone, 0);
 }
 
 }  // namespace
