@@ -324,19 +324,20 @@ void add_level_options(CLI::App* app, ExtractArguments& arguments) {
 }
 
 void add_outputs(CLI::App* app, ExtractArguments& arguments) {
-  add_output(app, arguments.output, "MESH",
-             "Mesh to write, .ply, .stl, .obj, .glb, .vtp, .pvtp or .neuroglancer; several "
-             "isovalues make head_500.ply and so on; - for standard output",
-             "head_500.ply of head.zarr, unless --preview or --estimate is all");
+  add_output(
+      app, arguments.output, "MESH",
+      "Mesh to write, .ply, .stl, .obj, .glb, .vtp, .pvtp, .neuroglancer or .3dtiles; several "
+      "isovalues make head_500.ply and so on; - for standard output",
+      "head_500.ply of head.zarr, unless --preview or --estimate is all");
   add_parsed(app, arguments.format, parse_mesh_format,
-             {"--format", "ply|stl|obj|glb|vtp|pvtp|neuroglancer", "Format of the mesh",
+             {"--format", "ply|stl|obj|glb|vtp|pvtp|neuroglancer|3dtiles", "Format of the mesh",
               "by its extension, or ply"});
   add_flag(app, "--quantize", arguments.quantize,
            "GLB with positions and normals of 16 bits (KHR_mesh_quantization)");
   add_parsed(app, arguments.levels, parse_detail_levels,
              {"--levels", "auto|N",
-              "Levels of detail of neuroglancer's format at most, each with a quarter of the "
-              "triangles of the one before; auto: until one part has the whole mesh",
+              "Levels of detail of neuroglancer's format and 3D Tiles at most, each with a quarter "
+              "of the triangles of the one before; auto: until one part has the whole mesh",
               "auto"});
   add_flag(app, "--sharded", arguments.sharded,
            "neuroglancer's format in few large files, in place of two for each mesh");

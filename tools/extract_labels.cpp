@@ -15,7 +15,7 @@
 #include "io/bytes/folder_walk.h"
 #include "io/bytes/output_file.h"
 #include "io/bytes/output_guard.h"
-#include "io/meshes/levels/neuroglancer_folder.h"
+#include "io/meshes/levels/level_folder.h"
 #include "pipeline/program_memory.h"
 #include "tools/format.h"
 #include "tools/label_report.h"
@@ -45,7 +45,7 @@ std::int64_t parse_label(std::string_view text) {
 
 /// Whether a file may be part of an output: a mesh of a label, or the list.
 bool is_own_name(std::string_view name) {
-  if (name == kListName || NeuroglancerFolder::is_own_name(name)) return true;
+  if (name == kListName || is_level_file(name)) return true;
   const std::size_t dot = name.find('.');
   if (dot == name.npos || !find_mesh_format(name.substr(dot))) return false;
   std::string_view label = name.substr(0, dot);
@@ -96,11 +96,11 @@ void check_label_arguments(const ExtractArguments& arguments) {
 std::string folder_name(const ExtractArguments& arguments) {
   if (arguments.output.empty())
     return stem_of_input(arguments.input.path, arguments.input.volume) + "_labels";
-  const std::string_view own = extension_of(MeshFormat::neuroglancer);
-  refuse_misleading_name(
-      arguments.output,
-      std::span(&own, has_levels(format_of(arguments)) ? std::size_t{1} : std::size_t{0}),
-      "--labels writes a folder with a mesh for each label");
+  const MeshFormat format = format_of(arguments);
+  const std::string_view own = extension_of(format);
+  refuse_misleading_name(arguments.output,
+                         std::span(&own, has_levels(format) ? std::size_t{1} : std::size_t{0}),
+                         "--labels writes a folder with a mesh for each label");
   return arguments.output;
 }
 
@@ -153,7 +153,10 @@ class LabelWriter {
     plan_ = plan_visits(arguments, filter_);
     filter_.memory = plan_.filter_bytes;
     filter_.threads = 1;
-    if (has_levels(format_)) segments_.emplace(folder_, arguments.sharded);
+    if (has_levels(format_))
+      levels_ = open_level_folder(folder_, {.as_tiles = format_ == MeshFormat::tiles3d,
+                                            .sharded = arguments.sharded,
+                                            .has_labels = true});
   }
 
   int visits() const { return plan_.visits; }
@@ -164,11 +167,11 @@ class LabelWriter {
     ordered_json entry{{"label", mesh.label()}};
     if (const LabelProperties* properties = find_properties(mesh.label()))
       add_properties(entry, *properties);
-    entry["file"] = arguments_.sharded ? ordered_json() : ordered_json(name);
+    entry["file"] = name.empty() ? ordered_json() : ordered_json(name);
     MeshSize size = mesh.size();
     if (filter_.any()) {
       MeshFilterOptions options = filter_;
-      options.scratch_beside = folder_ / name;
+      options.scratch_beside = folder_ / kListName;
       MeshFilter filter(*sink, options);
       mesh.write(filter);
       size = filter.size();
@@ -183,16 +186,16 @@ class LabelWriter {
     const std::lock_guard lock(mutex_);
     written_.vertices += size.vertices;
     written_.triangles += size.triangles;
-    if (!segments_) bytes_ += sink->bytes();
+    if (!levels_) bytes_ += sink->bytes();
     entries_.emplace(mesh.index(), entry.dump());
     write_entries();
   }
 
   /// Ends the list.
   void finish() {
-    if (segments_) {
-      segments_->finish();
-      bytes_ += segments_->bytes();
+    if (levels_) {
+      levels_->finish();
+      bytes_ += levels_->bytes();
     }
     FileWriter& out = list_.writer();
     out.append("\n]}\n");
@@ -205,23 +208,20 @@ class LabelWriter {
 
  private:
   std::string file_of(std::int64_t label) const {
-    return fmt::format("{}{}", label, segments_ ? "" : isobrick::extension_of(format_));
+    return levels_ ? levels_->file_of(label)
+                   : fmt::format("{}{}", label, isobrick::extension_of(format_));
   }
 
   std::unique_ptr<MeshSink> open_sink(std::int64_t label, const std::string& name) {
-    if (!segments_)
+    if (!levels_)
       return create_mesh_file(folder_ / name, {.format = format_,
                                                .quantize = arguments_.quantize,
                                                .threads = 1,
                                                .memory = plan_.mesh_bytes});
-    if (label < 0)
-      throw UsageError(fmt::format(
-          "neuroglancer has no negative segments such as {}: leave them out of --labels", label));
-    SegmentProperties properties;
+    MeshProperties properties;
     if (const LabelProperties* known = find_properties(label))
       properties = {known->name, known->colour};
-    return segments_->segment(static_cast<std::uint64_t>(label),
-                              {.levels = arguments_.levels, .threads = 1}, properties);
+    return levels_->add_mesh(label, {.levels = arguments_.levels, .threads = 1}, properties);
   }
 
   /// Writes those that come next, in the order of the labels.
@@ -249,7 +249,7 @@ class LabelWriter {
   fs::path folder_;
   MeshFilterOptions filter_;
   VisitPlan plan_;
-  std::optional<NeuroglancerFolder> segments_;  ///< in place of a file each
+  std::unique_ptr<LevelFolder> levels_;  ///< in place of a file each; null for other formats
   std::mutex mutex_;
   OutputFile list_;
   std::map<std::uint64_t, std::string> entries_;  ///< that wait for those before them

@@ -206,17 +206,18 @@ void add_merge(Program& program) {
       "  isobrick merge head_900_*of2.piece -o head_900.ply");
   add_paths(app, "PIECES", arguments->pieces, "All pieces of the mesh, in any order");
   add_output(app, arguments->output, "MESH",
-             "Mesh to write, .ply, .stl, .obj, .glb, .vtp, .pvtp or .neuroglancer; - for standard "
-             "output",
+             "Mesh to write, .ply, .stl, .obj, .glb, .vtp, .pvtp, .neuroglancer or .3dtiles; - for "
+             "standard output",
              "head_500.ply of head_500_1of8.piece, in the current folder");
   add_parsed(app, arguments->format,
              [](const std::string& text) { return std::optional(parse_mesh_format(text)); },
-             {"--format", "ply|stl|obj|glb|vtp|pvtp|neuroglancer", "Format of the mesh",
+             {"--format", "ply|stl|obj|glb|vtp|pvtp|neuroglancer|3dtiles", "Format of the mesh",
               "by its extension, or ply"});
   add_flag(app, "--quantize", arguments->quantize,
            "GLB with positions and normals of 16 bits (KHR_mesh_quantization)");
   add_parsed(app, arguments->levels, parse_detail_levels,
-             {"--levels", "auto|N", "Levels of detail of neuroglancer's format at most", "auto"});
+             {"--levels", "auto|N",
+              "Levels of detail of neuroglancer's format and 3D Tiles at most", "auto"});
   add_flag(app, "--sharded", arguments->sharded, "neuroglancer's format in few large files");
   add_filters(app, arguments->filters);
   add_attributes(app, arguments->attributes);

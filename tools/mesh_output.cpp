@@ -51,21 +51,26 @@ MeshFormat mesh_format(const fs::path& path) {
     return *format;
   throw UsageError(
       fmt::format("'{}' is no mesh that can be written; name it .ply, .stl, .obj, .glb, .vtp, "
-                  ".pvtp or .neuroglancer, or add --format",
+                  ".pvtp, .neuroglancer or .3dtiles, or add --format",
                   path.string()));
 }
 
 MeshFormat parse_mesh_format(const std::string& text) {
   if (const auto format = find_mesh_format("." + text)) return *format;
   throw UsageError(fmt::format(
-      "'{}' is no format of a mesh; it is ply, stl, obj, glb, vtp, pvtp or neuroglancer", text));
+      "'{}' is no format of a mesh; it is ply, stl, obj, glb, vtp, pvtp, neuroglancer or 3dtiles",
+      text));
 }
 
 void check_levels(const MeshForm& form) {
-  const char* option = form.levels > 0 ? "--levels" : form.sharded ? "--sharded" : nullptr;
-  if (option && !has_levels(form.format))
+  if (form.levels > 0 && !has_levels(form.format))
     throw UsageError(fmt::format(
-        "{} is for neuroglancer only, and this mesh becomes {}: add --format neuroglancer", option,
+        "--levels is for neuroglancer and 3D Tiles only, and this mesh becomes {}: add --format "
+        "neuroglancer or 3dtiles",
+        name_of(form.format)));
+  if (form.sharded && form.format != MeshFormat::neuroglancer)
+    throw UsageError(fmt::format(
+        "--sharded is for neuroglancer only, and this mesh becomes {}: add --format neuroglancer",
         name_of(form.format)));
 }
 

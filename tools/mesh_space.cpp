@@ -49,6 +49,13 @@ MeshBytes predict_bytes(const MeshForm& form, MeshSize size) {
       const std::uint64_t file = header + t * 10 / 3, mesh = v * vector + t * triangle;
       return {file, 2 * file + 2 * mesh + 2 * t * triangle + v * 24};
     }
+    case MeshFormat::tiles3d: {
+      // Cuts at tiles add about a tenth, coarser levels a third, and a tile's JSON two bytes a
+      // triangle. Scratch files as above.
+      const std::uint64_t mesh = rows + t * triangle;
+      const std::uint64_t file = header + (mesh * 11 / 10 + 2 * t) * 4 / 3;
+      return {file, file + 2 * mesh + 2 * t * triangle + v * 24};
+    }
   }
   return {};
 }

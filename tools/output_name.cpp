@@ -15,11 +15,12 @@ namespace {
 
 /// Extensions by which people and programs know a format of volumes, meshes or pictures.
 constexpr std::string_view kKnown[] = {
-    ".raw",  ".bin", ".nrrd", ".nhdr", ".vdb",          ".mha",  ".mhd",  ".nii", ".gz",   ".img",
-    ".hdr",  ".h5",  ".hdf",  ".hdf5", ".nc",           ".tif",  ".tiff", ".dcm", ".vti",  ".vtk",
-    ".npy",  ".npz", ".zarr", ".n5",   ".ply",          ".stl",  ".obj",  ".glb", ".gltf", ".vtp",
-    ".vtu",  ".off", ".pvtp", ".png",  ".jpg",          ".jpeg", ".bmp",  ".gif", ".webp", ".exr",
-    ".json", ".txt", ".csv",  ".zip",  ".neuroglancer", ".piece"};
+    ".raw",  ".bin", ".nrrd", ".nhdr", ".vdb",          ".mha",     ".mhd",  ".nii",
+    ".gz",   ".img", ".hdr",  ".h5",   ".hdf",          ".hdf5",    ".nc",   ".tif",
+    ".tiff", ".dcm", ".vti",  ".vtk",  ".npy",          ".npz",     ".zarr", ".n5",
+    ".ply",  ".stl", ".obj",  ".glb",  ".gltf",         ".vtp",     ".vtu",  ".off",
+    ".pvtp", ".png", ".jpg",  ".jpeg", ".bmp",          ".gif",     ".webp", ".exr",
+    ".json", ".txt", ".csv",  ".zip",  ".neuroglancer", ".3dtiles", ".piece"};
 
 bool is_among(std::string_view extension, std::span<const std::string_view> extensions) {
   return std::find(extensions.begin(), extensions.end(), extension) != extensions.end();

@@ -11,8 +11,8 @@
 
 namespace isobrick::inline v0 {
 
-/// The files that a mesh can become; of neuroglancer a folder of levels of detail.
-enum class MeshFormat : std::uint8_t { ply, stl, obj, glb, vtp, pvtp, neuroglancer };
+/// The files that a mesh can become; of neuroglancer and 3D Tiles a folder of levels of detail.
+enum class MeshFormat : std::uint8_t { ply, stl, obj, glb, vtp, pvtp, neuroglancer, tiles3d };
 
 /// The format's name for people: "PLY".
 ISOBRICK_API std::string_view name_of(MeshFormat format);
@@ -29,7 +29,7 @@ ISOBRICK_API bool has_normals(MeshFormat format);
 ISOBRICK_API bool has_vertices(MeshFormat format);
 /// Whether it holds MeshChunk::attributes: PLY, GLB, VTP and PVTP do. Others ignore them.
 ISOBRICK_API bool has_attributes(MeshFormat format);
-/// Whether it is a folder with the mesh at several levels of detail: neuroglancer is.
+/// Whether it is a folder with the mesh at several levels of detail: neuroglancer and 3D Tiles are.
 ISOBRICK_API bool has_levels(MeshFormat format);
 
 /// Levels of detail at most.

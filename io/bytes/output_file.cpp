@@ -211,6 +211,14 @@ void OutputFile::publish() {
   temporary_.clear();
 }
 
+void write_new_file(const std::string& path, std::string_view bytes) {
+  UniqueFd fd(::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666));
+  if (fd.get() < 0) throw system_error("create", path, errno);
+  FileWriter writer({std::move(fd), path});
+  writer.append(bytes);
+  writer.finish();
+}
+
 File open_scratch_file(const std::string& path) {
   const bool beside = path != kStandardOutput;
   const auto named = beside ? std::filesystem::path(path) : temporary_folder();

@@ -116,6 +116,10 @@ class OutputFile {
   FileWriter writer_;
 };
 
+/// Writes a file that is not there yet, in a folder that has no final name before all of it is
+/// whole. Throws Error.
+void write_new_file(const std::string& path, std::string_view bytes);
+
 /// A nameless file in the folder of `path`, for standard output in that of temporary files: gone
 /// when it is closed, whatever happens. Messages name `path`, or that folder.
 File open_scratch_file(const std::string& path);

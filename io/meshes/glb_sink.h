@@ -4,7 +4,7 @@
 #include <limits>
 #include <string>
 
-#include "io/meshes/glb_scene.h"
+#include "io/meshes/gltf/glb_scene.h"
 #include "io/meshes/parted_mesh_sink.h"
 
 namespace isobrick::inline v0 {

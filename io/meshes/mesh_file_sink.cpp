@@ -8,7 +8,7 @@
 
 #include <isobrick/error.h>
 #include "io/meshes/glb_sink.h"
-#include "io/meshes/levels/neuroglancer_folder.h"
+#include "io/meshes/levels/level_folder.h"
 #include "io/meshes/mesh_parts.h"
 #include "io/meshes/obj_sink.h"
 #include "io/meshes/ply_sink.h"
@@ -23,14 +23,15 @@ struct NamedFormat {
   std::string_view extension, name;
 };
 
-constexpr std::array<NamedFormat, 7> kFormats{
+constexpr std::array<NamedFormat, 8> kFormats{
     {{MeshFormat::ply, ".ply", "PLY"},
      {MeshFormat::stl, ".stl", "STL"},
      {MeshFormat::obj, ".obj", "OBJ"},
      {MeshFormat::glb, ".glb", "GLB"},
      {MeshFormat::vtp, ".vtp", "VTP"},
      {MeshFormat::pvtp, ".pvtp", "PVTP"},
-     {MeshFormat::neuroglancer, ".neuroglancer", "neuroglancer's format"}}};
+     {MeshFormat::neuroglancer, ".neuroglancer", "neuroglancer's format"},
+     {MeshFormat::tiles3d, ".3dtiles", "3D Tiles"}}};
 
 /// What the arrays of a file that come behind the vertices may take of a budget until they are
 /// written, rather than to be written and read once more: nothing of a small one, which the
@@ -42,9 +43,11 @@ std::size_t waiting_memory(std::uint64_t memory) {
 
 /// Throws UsageError for levels that the format has not.
 void check_levels(MeshFormat format, const MeshFileOptions& options) {
-  if (!has_levels(format) && (options.levels != 0 || options.sharded))
-    throw UsageError(fmt::format("{} has no levels of detail and no shards; neuroglancer's has",
-                                 name_of(format)));
+  if (!has_levels(format) && options.levels != 0)
+    throw UsageError(fmt::format(
+        "{} has no levels of detail; neuroglancer's format and 3D Tiles have", name_of(format)));
+  if (format != MeshFormat::neuroglancer && options.sharded)
+    throw UsageError(fmt::format("{} has no shards; neuroglancer's format has", name_of(format)));
   if (options.levels < 0 || options.levels > kMaxMeshLevels)
     throw UsageError(
         fmt::format("a mesh has 1 to {} levels of detail, not {}", kMaxMeshLevels, options.levels));
@@ -76,11 +79,12 @@ bool has_normals(MeshFormat format) {
 bool has_vertices(MeshFormat format) { return format != MeshFormat::stl; }
 
 bool has_attributes(MeshFormat format) {
-  return format != MeshFormat::stl && format != MeshFormat::obj &&
-         format != MeshFormat::neuroglancer;
+  return format != MeshFormat::stl && format != MeshFormat::obj && !has_levels(format);
 }
 
-bool has_levels(MeshFormat format) { return format == MeshFormat::neuroglancer; }
+bool has_levels(MeshFormat format) {
+  return format == MeshFormat::neuroglancer || format == MeshFormat::tiles3d;
+}
 
 std::unique_ptr<MeshSink> create_mesh_file(const std::filesystem::path& path,
                                            const MeshFileOptions& options) {
@@ -89,8 +93,8 @@ std::unique_ptr<MeshSink> create_mesh_file(const std::filesystem::path& path,
   const auto format = options.format ? options.format : find_mesh_format(path.extension().string());
   if (!format)
     throw UsageError(fmt::format(
-        "'{}' is no mesh that can be written; name it .ply, .stl, .obj, .glb, .vtp, .pvtp or "
-        ".neuroglancer",
+        "'{}' is no mesh that can be written; name it .ply, .stl, .obj, .glb, .vtp, .pvtp, "
+        ".neuroglancer or .3dtiles",
         name));
   check_levels(*format, options);
   switch (*format) {
@@ -104,11 +108,13 @@ std::unique_ptr<MeshSink> create_mesh_file(const std::filesystem::path& path,
       return std::make_unique<VtpSink>(name, force, waiting_memory(options.memory));
     case MeshFormat::pvtp: return std::make_unique<PvtpSink>(name, force);
     case MeshFormat::neuroglancer:
-      return create_neuroglancer_mesh(path, force, options.sharded,
-                                      {.levels = options.levels,
-                                       .threads = options.threads,
-                                       .memory = level_share(options.memory),
-                                       .progress = options.progress});
+    case MeshFormat::tiles3d:
+      return create_level_mesh(
+          path, force, {.as_tiles = *format == MeshFormat::tiles3d, .sharded = options.sharded},
+          {.levels = options.levels,
+           .threads = options.threads,
+           .memory = level_share(options.memory),
+           .progress = options.progress});
   }
   throw UsageError("no such format of a mesh");
 }
@@ -121,6 +127,7 @@ std::uint64_t mesh_file_memory(MeshFormat format, int threads, std::uint64_t mem
     case MeshFormat::glb: return part_memory(GlbOptions{}.part_triangles);
     case MeshFormat::pvtp: return part_memory(PvtpSink::kPartTriangles);
     case MeshFormat::neuroglancer:
+    case MeshFormat::tiles3d:
       return level_memory({.threads = threads, .memory = level_share(memory)});
     default: return 0;
   }

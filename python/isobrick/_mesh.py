@@ -122,15 +122,15 @@ class Mesh:
         Parameters
         ----------
         path : str or path
-            The extension is the format: .ply, .stl, .obj, .glb, .vtp, .pvtp or
-            .neuroglancer, a folder of levels of detail.
+            The extension is the format: .ply, .stl, .obj, .glb, .vtp, .pvtp, or .neuroglancer and
+            .3dtiles, folders of levels of detail.
         force : bool
             Replaces a file that exists; otherwise that is a UsageError.
         quantize : bool
             GLB only: 16 bits a coordinate.
         levels : int, optional
-            neuroglancer only: levels of detail at most; by default until one part has the whole
-            mesh.
+            neuroglancer and 3D Tiles only: levels of detail at most; by default until one part has
+            the whole mesh.
         sharded : bool
             neuroglancer only: few large files.
         progress : function or tqdm, optional

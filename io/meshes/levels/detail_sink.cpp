@@ -1,4 +1,4 @@
-#include "io/meshes/levels/segment_sink.h"
+#include "io/meshes/levels/detail_sink.h"
 
 #include <algorithm>
 #include <cmath>
@@ -7,8 +7,8 @@
 
 #include <fmt/format.h>
 
-#include <isobrick/mesh_filters.h>
-#include "io/meshes/levels/draco_mesh.h"
+#include "filters/simplify_stage.h"
+#include "io/meshes/levels/level_fragments.h"
 
 namespace isobrick::inline v0 {
 namespace {
@@ -61,26 +61,27 @@ std::uint64_t level_share(std::uint64_t budget) {
   return budget < 512 * kMiB ? 16 * kMiB : std::min(budget / 8, 1024 * kMiB);
 }
 
-SegmentSink::SegmentSink(FileWriter& fragments, const LevelOptions& options, Finish finish)
-    : fragments_(fragments),
+DetailSink::DetailSink(std::unique_ptr<LevelWriter> writer, const LevelOptions& options)
+    : writer_(std::move(writer)),
+      needs_(writer_->needs()),
       options_(options),
-      finish_(std::move(finish)),
       place_{.beside = options.scratch_beside.string()},
-      mesh_(make_spool()) {
-  check_draco();
+      mesh_(make_spool()) {}
+
+MeshSpool DetailSink::make_spool() const { return MeshSpool(place_, options_.memory / 4); }
+
+void DetailSink::begin(const MeshHeader& header) {
+  mesh_.begin({.has_normals = header.has_normals && needs_.normals});
+  writer_->begin(header);
 }
 
-MeshSpool SegmentSink::make_spool() const { return MeshSpool(place_, options_.memory / 4); }
-
-void SegmentSink::begin(const MeshHeader&) { mesh_.begin({}); }
-
-void SegmentSink::write(const MeshChunk& chunk) {
+void DetailSink::write(const MeshChunk& chunk) {
   MeshChunk plain = chunk;
-  plain.normals = {};
+  if (!needs_.normals) plain.normals = {};
   mesh_.append(plain);
 }
 
-SegmentSink::Extent SegmentSink::measure(MeshSpool& mesh) const {
+DetailSink::Extent DetailSink::measure(MeshSpool& mesh) const {
   constexpr double far = std::numeric_limits<double>::infinity();
   Extent extent{.bounds = {{far, far, far}, {-far, -far, -far}}};
   double area = 0;
@@ -101,7 +102,7 @@ SegmentSink::Extent SegmentSink::measure(MeshSpool& mesh) const {
   return extent;
 }
 
-void SegmentSink::choose_grid(const Extent& extent) {
+void DetailSink::choose_grid(const Extent& extent) {
   // Triangles of very different sizes may crowd in a fragment.
   constexpr int most_divisions = 6;
   double edge = kFragmentEdges * extent.edge;
@@ -114,7 +115,7 @@ void SegmentSink::choose_grid(const Extent& extent) {
   }
 }
 
-void SegmentSink::write_level(MeshSpool& mesh, int level, double scale) {
+void DetailSink::write_level(int level, double edge) {
   Progress& progress = options_.progress ? *options_.progress : no_progress();
   const FragmentWork work{.place = place_,
                           .memory = options_.memory / 4,
@@ -122,53 +123,47 @@ void SegmentSink::write_level(MeshSpool& mesh, int level, double scale) {
                           .threads = options_.threads,
                           .progress = &progress};
   progress.begin(fmt::format("level of detail {}", level),
-                 3 * mesh.triangles().size() * sizeof(Triangle));
-  const std::uint64_t before = fragments_.size();
-  LevelFragments fragments(mesh, grid_, level, work);
-  ManifestLevel& entry = manifest_.emplace_back();
-  entry.fragments = fragments.encode([&](std::string_view bytes) { fragments_.append(bytes); });
-  // 0 would stand for a level that is not there.
-  entry.scale = scale > 0 ? static_cast<float>(scale) : grid_.edge;
-  if (level > 0) entry.scale = std::max(entry.scale, manifest_[manifest_.size() - 2].scale);
-  written_.push_back({mesh.size().triangles, entry.fragments.size(), fragments_.size() - before});
+                 3 * mesh_.triangles().size() * sizeof(Triangle));
+  LevelFragments fragments(mesh_, grid_, level, work);
+  EncodedLevel& encoded =
+      encoded_.emplace_back(EncodedLevel{edge, error_, fragments.encode(*writer_)});
+  WrittenLevel& written = written_.emplace_back();
+  written.triangles = mesh_.size().triangles;
+  written.fragments = encoded.fragments.size();
+  for (const EncodedFragment& fragment : encoded.fragments) written.bytes += fragment.bytes;
   progress.end();
 }
 
-bool SegmentSink::simplify() {
+bool DetailSink::simplify() {
   const std::uint64_t before = mesh_.size().triangles;
   MeshSpool simpler = make_spool();
   SpoolSink sink(simpler);
-  MeshFilter filter(sink, {.simplify_ratio = kLevelRatio,
-                           .threads = options_.threads,
-                           .memory = options_.memory / 4,
-                           .scratch_beside = options_.scratch_beside,
-                           .progress = options_.progress});
-  filter.begin({});
-  mesh_.replay_and_release(filter);
-  filter.finish();
+  SimplifyStage stage(sink, {}, place_, options_.memory / 4,
+                      {.ratio = kLevelRatio,
+                       .threads = options_.threads,
+                       .progress = options_.progress,
+                       .measures_error = needs_.errors});
+  stage.begin({.has_normals = mesh_.has_normals()});
+  mesh_.replay_and_release(stage);
+  stage.finish();
+  error_ += stage.error();
   mesh_ = std::move(simpler);
   return static_cast<double>(mesh_.size().triangles) < kWorthRatio * static_cast<double>(before);
 }
 
-void SegmentSink::finish() {
+void DetailSink::finish() {
   if (mesh_.size().triangles > 0) {
     Extent extent = measure(mesh_);
     choose_grid(extent);
     const int levels = options_.levels > 0 ? options_.levels : grid_.levels();
     for (int level = 0;;) {
-      write_level(mesh_, level, extent.edge);
+      write_level(level, extent.edge);
       if (++level == levels || !simplify()) break;
       extent = measure(mesh_);
     }
   }
   mesh_.release();
-  // Readers take neither a segment without levels nor a level without fragments.
-  if (manifest_.empty()) manifest_.push_back({.scale = 1});
-  if (manifest_.front().fragments.empty()) manifest_.front().fragments.push_back({});
-  complete_octree(manifest_);
-  finish_(manifest_bytes(grid_, manifest_));
+  writer_->finish(grid_, std::move(encoded_));
 }
-
-std::uint64_t SegmentSink::bytes() const { return mesh_.bytes() + fragments_.size(); }
 
 }  // namespace isobrick

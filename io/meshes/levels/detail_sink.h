@@ -2,16 +2,14 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <functional>
-#include <string>
+#include <memory>
 #include <vector>
 
 #include <isobrick/mesh.h>
 #include <isobrick/progress.h>
 #include "filters/mesh_spool.h"
-#include "io/bytes/output_file.h"
 #include "io/meshes/levels/level_sink.h"
-#include "io/meshes/levels/manifest.h"
+#include "io/meshes/levels/level_writer.h"
 
 namespace isobrick::inline v0 {
 
@@ -30,24 +28,20 @@ std::uint64_t level_memory(const LevelOptions& options);
 /// Of a budget of the whole operation, what becomes LevelOptions::memory.
 std::uint64_t level_share(std::uint64_t budget);
 
-/// Makes levels of detail of a mesh and encodes them for neuroglancer. Level 0 is the mesh itself;
-/// each further one is the one before with a quarter of its triangles, simplified with its topology
-/// kept. Levels end early where a further one would not be clearly smaller.
+/// Makes levels of detail of a mesh, whose fragments a format encodes and writes. Level 0 is the
+/// mesh itself; each further one is the one before with a quarter of its triangles, simplified with
+/// its topology kept. Levels end early where a further one would not be clearly smaller.
 ///
 /// What it writes depends on the mesh and the number of levels alone.
-class SegmentSink final : public LevelSink {
+class DetailSink final : public LevelSink {
  public:
-  /// Takes the manifest when all fragments are written.
-  using Finish = std::function<void(const std::string& manifest)>;
-
-  /// Appends the fragments to `fragments`, which must outlive it.
-  SegmentSink(FileWriter& fragments, const LevelOptions& options, Finish finish);
+  DetailSink(std::unique_ptr<LevelWriter> writer, const LevelOptions& options);
 
   Indexing indexing() const override { return Indexing::welded; }
   void begin(const MeshHeader& header) override;
   void write(const MeshChunk& chunk) override;
   void finish() override;
-  std::uint64_t bytes() const override;
+  std::uint64_t bytes() const override { return mesh_.bytes() + writer_->bytes(); }
   std::uint64_t memory() const override { return level_memory(options_); }
 
   std::vector<WrittenLevel> levels() const override { return written_; }
@@ -62,17 +56,18 @@ class SegmentSink final : public LevelSink {
   MeshSpool make_spool() const;
   Extent measure(MeshSpool& mesh) const;
   void choose_grid(const Extent& extent);
-  void write_level(MeshSpool& mesh, int level, double scale);
+  void write_level(int level, double edge);
   /// Replaces the mesh by a simpler one; false where there is none worth a level.
   bool simplify();
 
-  FileWriter& fragments_;
+  std::unique_ptr<LevelWriter> writer_;
+  LevelNeeds needs_;
   LevelOptions options_;
-  Finish finish_;
   ScratchPlace place_;
   MeshSpool mesh_;
+  double error_ = 0;  ///< EncodedLevel::error
   ChunkGrid grid_;
-  std::vector<ManifestLevel> manifest_;
+  std::vector<EncodedLevel> encoded_;
   std::vector<WrittenLevel> written_;
 };
 

@@ -15,48 +15,59 @@ Range range_along(const LatticeTriangle& t, std::size_t axis) {
   return {lo, hi};
 }
 
+Range range_along(const CutTriangle& t, std::size_t axis) {
+  const auto [lo, hi] = std::minmax({t[0].at[axis], t[1].at[axis], t[2].at[axis]});
+  return {lo, hi};
+}
+
 /// The rounded quotient of numbers above 0.
 std::int64_t divide_rounded(std::int64_t a, std::int64_t b) { return (a + b / 2) / b; }
 
-/// Where the side between two points meets a plane between them: the same point from both ends.
-LatticePoint meet(LatticePoint a, LatticePoint b, std::size_t axis, std::int64_t plane) {
-  if (b < a) std::swap(a, b);
-  const std::int64_t whole = b[axis] - a[axis], part = plane - a[axis];
-  LatticePoint point;
+/// Where the side between two corners meets a plane between them: the same from both ends.
+LatticeCorner meet(const LatticeCorner& from, const LatticeCorner& to, std::size_t axis,
+                   std::int64_t plane) {
+  const bool swaps = to.at < from.at;
+  const LatticeCorner &a = swaps ? to : from, &b = swaps ? from : to;
+  const std::int64_t whole = b.at[axis] - a.at[axis], part = plane - a.at[axis];
+  const std::int64_t length = whole < 0 ? -whole : whole;
+  LatticeCorner corner;
   for (std::size_t i = 0; i < 3; ++i) {
-    const std::int64_t way = (b[i] - a[i]) * (whole < 0 ? -part : part);
-    const std::int64_t length = whole < 0 ? -whole : whole;
-    point[i] = a[i] + (way < 0 ? -divide_rounded(-way, length) : divide_rounded(way, length));
+    const std::int64_t way = (b.at[i] - a.at[i]) * (whole < 0 ? -part : part);
+    corner.at[i] =
+        a.at[i] + (way < 0 ? -divide_rounded(-way, length) : divide_rounded(way, length));
   }
-  point[axis] = plane;
-  return point;
+  corner.at[axis] = plane;
+  const float share = static_cast<float>(part) / static_cast<float>(whole);
+  corner.normal = a.normal + (b.normal - a.normal) * share;
+  return corner;
 }
 
-bool has_three_corners(const LatticeTriangle& t) {
-  return t[0] != t[1] && t[1] != t[2] && t[2] != t[0];
+bool has_three_corners(const CutTriangle& t) {
+  return t[0].at != t[1].at && t[1].at != t[2].at && t[2].at != t[0].at;
 }
 
-void add_piece(std::vector<LatticeTriangle>& pieces, const LatticeTriangle& piece) {
+void add_piece(std::vector<CutTriangle>& pieces, const CutTriangle& piece) {
   if (has_three_corners(piece)) pieces.push_back(piece);
 }
 
 /// Adds a polygon of three or four corners.
-void add_polygon(std::vector<LatticeTriangle>& pieces, const LatticePoint* corners,
+void add_polygon(std::vector<CutTriangle>& pieces, const LatticeCorner* corners,
                  std::size_t count) {
   for (std::size_t i = 2; i < count; ++i)
     add_piece(pieces, {corners[0], corners[i - 1], corners[i]});
 }
 
 /// Parts a triangle with corners on both sides of a plane.
-void part(const LatticeTriangle& t, std::size_t axis, std::int64_t plane,
-          std::vector<LatticeTriangle>& below, std::vector<LatticeTriangle>& above) {
-  LatticePoint low[4], high[4];
+void part(const CutTriangle& t, std::size_t axis, std::int64_t plane,
+          std::vector<CutTriangle>& below, std::vector<CutTriangle>& above) {
+  LatticeCorner low[4], high[4];
   std::size_t lows = 0, highs = 0;
   for (std::size_t i = 0; i < 3; ++i) {
-    const LatticePoint &a = t[i], &b = t[(i + 1) % 3];
-    if (a[axis] <= plane) low[lows++] = a;
-    if (a[axis] >= plane) high[highs++] = a;
-    if ((a[axis] < plane && b[axis] > plane) || (a[axis] > plane && b[axis] < plane))
+    const LatticeCorner &a = t[i], &b = t[(i + 1) % 3];
+    const std::int64_t at = a.at[axis], next = b.at[axis];
+    if (at <= plane) low[lows++] = a;
+    if (at >= plane) high[highs++] = a;
+    if ((at < plane && next > plane) || (at > plane && next < plane))
       low[lows++] = high[highs++] = meet(a, b, axis, plane);
   }
   add_polygon(below, low, lows);
@@ -65,7 +76,8 @@ void part(const LatticeTriangle& t, std::size_t axis, std::int64_t plane,
 
 }  // namespace
 
-LatticeCut::LatticeCut(const ChunkGrid& grid, int level) : halves_(level > 0 ? 2 : 1) {
+LatticeCut::LatticeCut(const ChunkGrid& grid, int level, bool has_halves)
+    : halves_(level > 0 && has_halves ? 2 : 1) {
   for (int axis = 0; axis < 3; ++axis)
     last_[static_cast<std::size_t>(axis)] =
         std::int64_t{grid.count(axis, level)} * std::int64_t{halves_} - 1;
@@ -85,7 +97,7 @@ std::int64_t LatticeCut::cell_at(std::int64_t place) const {
 void LatticeCut::cut_along(std::size_t axis) {
   to_.clear();
   while (!from_.empty()) {
-    const LatticeTriangle t = from_.back();
+    const CutTriangle t = from_.back();
     from_.pop_back();
     const Range range = range_along(t, axis);
     const std::int64_t next = plane(cell_at(range.lo) + 1);
@@ -97,14 +109,14 @@ void LatticeCut::cut_along(std::size_t axis) {
   std::swap(from_, to_);
 }
 
-const std::vector<LatticeTriangle>& LatticeCut::pieces_of(const LatticeTriangle& triangle) {
+const std::vector<CutTriangle>& LatticeCut::pieces_of(const CutTriangle& triangle) {
   from_.clear();
   add_piece(from_, triangle);
   for (std::size_t axis = 0; axis < 3; ++axis) cut_along(axis);
   return from_;
 }
 
-GridCell LatticeCut::cell_of(const LatticeTriangle& piece) const {
+GridCell LatticeCut::cell_of(const CutTriangle& piece) const {
   GridCell cell;
   for (std::size_t axis = 0; axis < 3; ++axis)
     cell[axis] =

@@ -7,20 +7,30 @@
 
 namespace isobrick::inline v0 {
 
+/// A corner of a triangle that is cut, with the normal of the mesh there.
+struct LatticeCorner {
+  LatticePoint at{};
+  Vec3f normal{};
+};
+
+/// A triangle that is cut, or a piece of one.
+using CutTriangle = std::array<LatticeCorner, 3>;
+
 /// Cuts triangles of a level's lattice at the faces of its fragments and, above level 0, at the
 /// planes through their middles. What a side of a triangle becomes depends on that side alone, so
 /// cut neighbours still share their sides, whichever fragments they are in. Not for several threads
 /// at once.
 class LatticeCut {
  public:
-  LatticeCut(const ChunkGrid& grid, int level);
+  /// Without `has_halves` no fragment is cut through its middle.
+  LatticeCut(const ChunkGrid& grid, int level, bool has_halves = true);
 
-  /// Calls f(piece, cell) for the pieces of a triangle, whose cell is that of a fragment, or above
-  /// level 0 of a half along each axis. Pieces without three different corners are left out, which
-  /// opens no surface.
+  /// Calls f(piece, cell) for the pieces of a triangle, whose cell is that of a fragment, or of a
+  /// half along each axis. Normals at cuts are interpolated along the side, of any length. Pieces
+  /// without three different corners are left out, which opens no surface.
   template <class F>
-  void for_each_piece(const LatticeTriangle& triangle, F&& f) {
-    for (const LatticeTriangle& piece : pieces_of(triangle)) f(piece, cell_of(piece));
+  void for_each_piece(const CutTriangle& triangle, F&& f) {
+    for (const CutTriangle& piece : pieces_of(triangle)) f(piece, cell_of(piece));
   }
 
   /// Calls f(cell) for the fragments that a triangle may have pieces in.
@@ -38,10 +48,10 @@ class LatticeCut {
   std::uint32_t halves() const { return halves_; }
 
  private:
-  const std::vector<LatticeTriangle>& pieces_of(const LatticeTriangle& triangle);
+  const std::vector<CutTriangle>& pieces_of(const CutTriangle& triangle);
   /// Cuts all of `from_` at the planes across an axis.
   void cut_along(std::size_t axis);
-  GridCell cell_of(const LatticeTriangle& piece) const;
+  GridCell cell_of(const CutTriangle& piece) const;
   void range_of(const LatticeTriangle& triangle, std::size_t axis, std::uint32_t& lo,
                 std::uint32_t& hi) const;
   /// The place of a plane between cells.
@@ -51,7 +61,7 @@ class LatticeCut {
 
   std::uint32_t halves_;
   std::array<std::int64_t, 3> last_;  ///< cell along each axis
-  std::vector<LatticeTriangle> from_, to_;
+  std::vector<CutTriangle> from_, to_;
 };
 
 }  // namespace isobrick

@@ -10,18 +10,15 @@
 
 #include <isobrick/error.h>
 #include "core/cancel.h"
-#include "io/meshes/levels/draco_mesh.h"
-#include "io/meshes/levels/lattice_cut.h"
 
 namespace isobrick::inline v0 {
 namespace {
 
 /// The triangles of a fragment, and what they become.
 struct Fragment {
-  std::uint64_t key = 0;
-  std::vector<std::array<Vec3f, 3>> triangles;
+  EncodedFragment entry;
+  std::vector<CutTriangle> triangles;
   std::string encoded;
-  std::uint8_t halves = 0;
 };
 
 /// What a thread keeps from fragment to fragment.
@@ -29,34 +26,38 @@ struct Encoder {
   LatticeCut cut;
   FragmentWelder welder;
 
-  Encoder(const ChunkGrid& grid, int level) : cut(grid, level) {}
+  Encoder(const ChunkGrid& grid, int level, bool has_halves) : cut(grid, level, has_halves) {}
 
-  void encode(Fragment& fragment, const ChunkGrid& grid, int level);
+  void encode(Fragment& fragment, const FragmentPlace& place, bool has_normals,
+              const LevelWriter& writer);
 };
 
-void Encoder::encode(Fragment& fragment, const ChunkGrid& grid, int level) {
-  const GridCell place = cell_of_key(fragment.key);
+void Encoder::encode(Fragment& fragment, const FragmentPlace& place, bool has_normals,
+                     const LevelWriter& writer) {
   const std::uint32_t halves = cut.halves();
-  welder.begin(fragment.triangles.size());
-  for (const std::array<Vec3f, 3>& t : fragment.triangles) {
-    const LatticeTriangle corners{grid.quantize(t[0], level), grid.quantize(t[1], level),
-                                  grid.quantize(t[2], level)};
-    cut.for_each_piece(corners, [&](const LatticeTriangle& piece, const GridCell& cell) {
+  EncodedFragment& entry = fragment.entry;
+  entry.lo.fill(std::numeric_limits<std::uint16_t>::max());
+  welder.begin(fragment.triangles.size(), has_normals);
+  for (const CutTriangle& triangle : fragment.triangles)
+    cut.for_each_piece(triangle, [&](const CutTriangle& piece, const GridCell& cell) {
       unsigned half = 0;
       for (std::size_t axis = 0; axis < 3; ++axis) {
-        if (cell[axis] / halves != place[axis]) return;
+        if (cell[axis] / halves != place.cell[axis]) return;
         half |= (cell[axis] % halves) << axis;
       }
-      fragment.halves = static_cast<std::uint8_t>(fragment.halves | 1U << half);
+      entry.halves = static_cast<std::uint8_t>(entry.halves | 1U << half);
       std::array<FragmentPoint, 3> points;
       for (std::size_t corner = 0; corner < 3; ++corner)
-        for (std::size_t axis = 0; axis < 3; ++axis)
-          points[corner][axis] = static_cast<std::uint16_t>(
-              piece[corner][axis] - std::int64_t{place[axis]} * ChunkGrid::kSteps);
-      welder.add(points);
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+          const auto step = static_cast<std::uint16_t>(
+              piece[corner].at[axis] - std::int64_t{place.cell[axis]} * ChunkGrid::kSteps);
+          points[corner][axis] = step;
+          entry.lo[axis] = std::min(entry.lo[axis], step);
+          entry.hi[axis] = std::max(entry.hi[axis], step);
+        }
+      welder.add(points, {piece[0].normal, piece[1].normal, piece[2].normal});
     });
-  }
-  fragment.encoded = encode_draco(welder.mesh());
+  fragment.encoded = writer.encode(welder.mesh(), place);
   fragment.triangles = {};
 }
 
@@ -129,45 +130,52 @@ void LevelFragments::sort() {
   for_each_touched([&](const Triangle& t, Run& run) { sorted_.edit(run.end++) = t; });
 }
 
-std::vector<std::array<Vec3f, 3>> LevelFragments::load(const Run& run) {
-  std::vector<std::array<Vec3f, 3>> triangles;
+std::vector<CutTriangle> LevelFragments::load(const Run& run, bool has_normals) {
+  std::vector<CutTriangle> triangles;
   triangles.reserve(static_cast<std::size_t>(run.size()));
   sorted_.for_each_run(run.begin, run.end, [&](std::span<const Triangle> part, std::uint64_t) {
     for (const Triangle& t : part) {
-      auto& corners = triangles.emplace_back();
-      for (std::size_t corner = 0; corner < 3; ++corner)
-        corners[corner] = mesh_.positions()[t[corner]];
+      CutTriangle& corners = triangles.emplace_back();
+      for (std::size_t corner = 0; corner < 3; ++corner) {
+        corners[corner].at = grid_.quantize(mesh_.positions()[t[corner]], level_);
+        if (has_normals) corners[corner].normal = mesh_.normals()[t[corner]];
+      }
     }
   });
   return triangles;
 }
 
-std::vector<EncodedFragment> LevelFragments::encode(
-    const std::function<void(std::string_view)>& write) {
+std::vector<EncodedFragment> LevelFragments::encode(LevelWriter& writer) {
   sort();
+  const bool has_normals = mesh_.has_normals();
   tbb::task_arena arena(work_.threads > 0 ? work_.threads : tbb::task_arena::automatic);
-  tbb::enumerable_thread_specific<Encoder> encoders([&] { return Encoder(grid_, level_); });
+  tbb::enumerable_thread_specific<Encoder> encoders(
+      [&] { return Encoder(grid_, level_, writer.needs().halves); });
   std::vector<EncodedFragment> encoded;
   std::vector<Fragment> batch;
+  const auto place_of = [&](const Fragment& fragment) {
+    return FragmentPlace{grid_, level_, cell_of_key(fragment.entry.key)};
+  };
   for (auto at = runs_.cbegin(); at != runs_.cend();) {
     batch.clear();
     std::uint64_t triangles = 0;
     do {
       triangles += at->second.size();
-      batch.push_back({.key = at->first, .triangles = load(at->second)});
+      batch.push_back({.entry = {.key = at->first}, .triangles = load(at->second, has_normals)});
     } while (++at != runs_.cend() && triangles + at->second.size() <= work_.triangles_at_once);
     arena.execute([&] {
-      tbb::parallel_for(std::size_t{0}, batch.size(),
-                        [&](std::size_t i) { encoders.local().encode(batch[i], grid_, level_); });
+      tbb::parallel_for(std::size_t{0}, batch.size(), [&](std::size_t i) {
+        encoders.local().encode(batch[i], place_of(batch[i]), has_normals, writer);
+      });
     });
     advance(triangles);
-    for (const Fragment& fragment : batch) {
+    for (Fragment& fragment : batch) {
       if (fragment.encoded.empty()) continue;
       if (fragment.encoded.size() > std::numeric_limits<std::uint32_t>::max())
-        throw Error("a part of the mesh has more than 4 GiB, which neuroglancer cannot read");
-      write(fragment.encoded);
-      encoded.push_back(
-          {fragment.key, static_cast<std::uint32_t>(fragment.encoded.size()), fragment.halves});
+        throw Error("a part of the mesh has more than 4 GiB, which no viewer can read");
+      fragment.entry.bytes = static_cast<std::uint32_t>(fragment.encoded.size());
+      writer.write(place_of(fragment), fragment.encoded);
+      encoded.push_back(fragment.entry);
     }
   }
   sorted_.release();

@@ -1,15 +1,15 @@
 #pragma once
 
 #include <cstdint>
-#include <functional>
 #include <map>
-#include <string_view>
 #include <vector>
 
 #include <isobrick/progress.h>
 #include "filters/mesh_spool.h"
 #include "filters/scratch_array.h"
 #include "io/meshes/levels/chunk_lattice.h"
+#include "io/meshes/levels/lattice_cut.h"
+#include "io/meshes/levels/level_writer.h"
 
 namespace isobrick::inline v0 {
 
@@ -18,14 +18,6 @@ namespace isobrick::inline v0 {
 std::uint64_t z_order_key(const GridCell& cell);
 /// The cell of a key.
 GridCell cell_of_key(std::uint64_t key);
-
-/// A fragment of a level that has triangles.
-struct EncodedFragment {
-  std::uint64_t key = 0;    ///< z_order_key of its place
-  std::uint32_t bytes = 0;  ///< of its mesh as Draco has it
-  /// Bit x + 2y + 4z: the half of each axis has triangles. On level 0 bit 0.
-  std::uint8_t halves = 0;
-};
 
 /// How a level is encoded.
 struct FragmentWork {
@@ -45,9 +37,9 @@ class LevelFragments {
   /// Triangles of the fragment with most of them.
   std::uint64_t largest() const;
 
-  /// Calls write(bytes) with the encoded mesh of each fragment, in the order of their keys, and
-  /// lists them. The bytes depend on nothing but the mesh and the grid.
-  std::vector<EncodedFragment> encode(const std::function<void(std::string_view)>& write);
+  /// Has `writer` encode and write the mesh of each fragment, in the order of their keys, and lists
+  /// them. The bytes depend on nothing but the mesh and the grid.
+  std::vector<EncodedFragment> encode(LevelWriter& writer);
   /// Bytes of the scratch file.
   std::uint64_t file_bytes() const { return sorted_.file_bytes(); }
 
@@ -65,7 +57,7 @@ class LevelFragments {
   void for_each_touched(F&& f);
   void sort();
   LatticeTriangle on_lattice(const Triangle& triangle);
-  std::vector<std::array<Vec3f, 3>> load(const Run& run);
+  std::vector<CutTriangle> load(const Run& run, bool has_normals);
 
   MeshSpool& mesh_;
   ChunkGrid grid_;

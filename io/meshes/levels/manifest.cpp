@@ -4,6 +4,8 @@
 #include <bit>
 #include <cstring>
 
+#include "io/meshes/levels/level_fragments.h"
+
 namespace isobrick::inline v0 {
 namespace {
 

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "io/meshes/levels/chunk_lattice.h"
-#include "io/meshes/levels/level_fragments.h"
+#include "io/meshes/levels/level_writer.h"
 
 namespace isobrick::inline v0 {
 

@@ -8,8 +8,9 @@
 
 #include <isobrick/error.h>
 #include "core/length_unit.h"
-#include "io/bytes/folder_output.h"
+#include "io/bytes/output_file.h"
 #include "io/meshes/levels/draco_mesh.h"
+#include "io/meshes/levels/manifest.h"
 
 namespace isobrick::inline v0 {
 namespace {
@@ -20,9 +21,6 @@ using nlohmann::ordered_json;
 constexpr std::string_view kInfo = "info", kProperties = "segment_properties",
                            kPropertiesInfo = "segment_properties/info", kIndex = ".index",
                            kShard = ".shard";
-/// The only segment of a mesh that is not of labels.
-constexpr std::uint64_t kOnlySegment = 1;
-
 bool consists_of(std::string_view text, std::string_view letters) {
   return !text.empty() && text.find_first_not_of(letters) == text.npos;
 }
@@ -39,36 +37,42 @@ std::string colour_text(const std::optional<std::array<std::uint8_t, 4>>& colour
   return fmt::format("#{:02x}{:02x}{:02x}", (*colour)[0], (*colour)[1], (*colour)[2]);
 }
 
+/// As the manifest has levels: octrees are complete.
+std::vector<ManifestLevel> manifest_of(const ChunkGrid& grid, std::vector<EncodedLevel> levels) {
+  std::vector<ManifestLevel> manifest;
+  for (EncodedLevel& level : levels) {
+    // 0 would stand for a level that is not there.
+    float scale = level.edge > 0 ? static_cast<float>(level.edge) : grid.edge;
+    if (!manifest.empty()) scale = std::max(scale, manifest.back().scale);
+    manifest.push_back({scale, std::move(level.fragments)});
+  }
+  // Readers take neither a segment without levels nor a level without fragments.
+  if (manifest.empty()) manifest.push_back({.scale = 1});
+  if (manifest.front().fragments.empty()) manifest.front().fragments.push_back({});
+  complete_octree(manifest);
+  return manifest;
+}
+
 }  // namespace
 
-/// A segment on its way to its files.
-class NeuroglancerFolder::Segment final : public LevelSink {
+/// Writes the files of a segment.
+class NeuroglancerFolder::Segment final : public LevelWriter {
  public:
-  Segment(NeuroglancerFolder& folder, std::uint64_t id, const LevelOptions& options)
+  Segment(NeuroglancerFolder& folder, std::uint64_t id)
       : folder_(folder),
         id_(id),
         file_(folder.sharded_ ? nullptr : std::make_unique<OutputFile>(path(""), false)),
         scratch_(folder.sharded_ ? std::make_unique<FileWriter>(open_scratch_beside(path("")))
-                                 : nullptr),
-        levels_(file_ ? file_->writer() : *scratch_, options,
-                [this](const std::string& manifest) { place(manifest); }) {}
+                                 : nullptr) {}
 
-  Indexing indexing() const override { return levels_.indexing(); }
-  void begin(const MeshHeader& header) override {
-    folder_.keep_unit(header.unit);
-    levels_.begin(header);
+  LevelNeeds needs() const override { return {.halves = true}; }
+  void begin(const MeshHeader& header) override { folder_.keep_unit(header.unit); }
+  std::string encode(const FragmentMesh& mesh, const FragmentPlace&) const override {
+    return encode_draco(mesh);
   }
-  void write(const MeshChunk& chunk) override { levels_.write(chunk); }
-  void finish() override { levels_.finish(); }
-  std::uint64_t bytes() const override { return levels_.bytes() + manifest_bytes_; }
-  std::uint64_t memory() const override { return levels_.memory(); }
-  std::vector<WrittenLevel> levels() const override { return levels_.levels(); }
-
- private:
-  std::string path(std::string_view extension) const {
-    return (folder_.folder_ / fmt::format("{}{}", id_, extension)).string();
-  }
-  void place(const std::string& manifest) {
+  void write(const FragmentPlace&, std::string_view bytes) override { fragments().append(bytes); }
+  void finish(const ChunkGrid& grid, std::vector<EncodedLevel> levels) override {
+    const std::string manifest = manifest_bytes(grid, manifest_of(grid, std::move(levels)));
     manifest_bytes_ = manifest.size();
     if (scratch_) {
       folder_.add_shard_entry(id_, *scratch_, manifest);
@@ -78,12 +82,18 @@ class NeuroglancerFolder::Segment final : public LevelSink {
     file_->publish();
     folder_.add_bytes(bytes + write_text(path(kIndex), manifest));
   }
+  std::uint64_t bytes() const override { return fragments().size() + manifest_bytes_; }
+
+ private:
+  std::string path(std::string_view extension) const {
+    return (folder_.folder_ / fmt::format("{}{}", id_, extension)).string();
+  }
+  FileWriter& fragments() const { return file_ ? file_->writer() : *scratch_; }
 
   NeuroglancerFolder& folder_;
   std::uint64_t id_, manifest_bytes_ = 0;
   std::unique_ptr<OutputFile> file_;     ///< of fragments; null in shards
   std::unique_ptr<FileWriter> scratch_;  ///< in its place in shards
-  SegmentSink levels_;
 };
 
 NeuroglancerFolder::NeuroglancerFolder(fs::path folder, bool sharded)
@@ -91,16 +101,24 @@ NeuroglancerFolder::NeuroglancerFolder(fs::path folder, bool sharded)
       sharded_(sharded),
       collected_(open_scratch_beside((folder_ / kInfo).string())) {}
 
-std::unique_ptr<LevelSink> NeuroglancerFolder::segment(std::uint64_t id,
-                                                       const LevelOptions& options,
-                                                       const SegmentProperties& properties) {
+std::unique_ptr<LevelSink> NeuroglancerFolder::add_mesh(std::int64_t label,
+                                                        const LevelOptions& options,
+                                                        const MeshProperties& properties) {
+  if (label < 0)
+    throw UsageError(fmt::format(
+        "neuroglancer has no negative segments such as {}: leave them out of --labels", label));
+  const auto id = static_cast<std::uint64_t>(label);
   {
     const std::lock_guard lock(mutex_);
     properties_[id] = properties;
   }
   LevelOptions of_segment = options;
   of_segment.scratch_beside = folder_ / kInfo;
-  return std::make_unique<Segment>(*this, id, of_segment);
+  return std::make_unique<DetailSink>(std::make_unique<Segment>(*this, id), of_segment);
+}
+
+std::string NeuroglancerFolder::file_of(std::int64_t label) const {
+  return sharded_ ? std::string() : fmt::format("{}", label);
 }
 
 void NeuroglancerFolder::keep_unit(const std::string& unit) {
@@ -187,46 +205,6 @@ bool NeuroglancerFolder::is_own_name(std::string_view name) {
     return consists_of(name.substr(0, name.size() - kShard.size()), hexadecimal);
   if (name.ends_with(kIndex)) name.remove_suffix(kIndex.size());
   return consists_of(name, decimal);
-}
-
-namespace {
-
-/// A folder with one segment.
-class NeuroglancerMesh final : public LevelSink {
- public:
-  NeuroglancerMesh(const fs::path& path, bool force, bool sharded, const LevelOptions& options)
-      : output_((check_draco(), path), force, NeuroglancerFolder::is_own_name),
-        folder_(output_.folder(), sharded),
-        segment_(folder_.segment(kOnlySegment, options, {.name = output_.path().stem().string()})) {
-  }
-
-  Indexing indexing() const override { return segment_->indexing(); }
-  void begin(const MeshHeader& header) override { segment_->begin(header); }
-  void write(const MeshChunk& chunk) override { segment_->write(chunk); }
-  void finish() override {
-    segment_->finish();
-    folder_.finish();
-    is_finished_ = true;
-    output_.publish();
-  }
-  std::uint64_t bytes() const override {
-    return is_finished_ ? folder_.bytes() : segment_->bytes();
-  }
-  std::uint64_t memory() const override { return segment_->memory(); }
-  std::vector<WrittenLevel> levels() const override { return segment_->levels(); }
-
- private:
-  FolderOutput output_;
-  NeuroglancerFolder folder_;
-  std::unique_ptr<LevelSink> segment_;
-  bool is_finished_ = false;
-};
-
-}  // namespace
-
-std::unique_ptr<MeshSink> create_neuroglancer_mesh(const fs::path& path, bool force, bool sharded,
-                                                   const LevelOptions& options) {
-  return std::make_unique<NeuroglancerMesh>(path, force, sharded, options);
 }
 
 }  // namespace isobrick

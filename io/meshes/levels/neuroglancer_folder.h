@@ -1,6 +1,5 @@
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <map>
@@ -12,32 +11,23 @@
 #include <vector>
 
 #include <isobrick/mesh.h>
-#include "io/meshes/levels/segment_sink.h"
+#include "io/meshes/levels/level_folder.h"
 #include "io/meshes/levels/shard_files.h"
 
 namespace isobrick::inline v0 {
 
-/// What neuroglancer shows of a segment beside its mesh.
-struct SegmentProperties {
-  std::string name = {};                                   ///< empty: none
-  std::optional<std::array<std::uint8_t, 4>> colour = {};  ///< sRGB and alpha
-};
-
-/// The files of meshes with levels of detail for neuroglancer (neuroglancer_multilod_draco), in a
-/// folder that is there: two files a segment, or shards with all of them. Its functions may be
-/// called by several threads at once, but finish().
-class NeuroglancerFolder {
+/// The files of meshes with levels of detail for neuroglancer (neuroglancer_multilod_draco): two
+/// files a segment, or shards with all of them. Labels are the numbers of segments.
+class NeuroglancerFolder final : public LevelFolder {
  public:
   /// Throws UsageError where this isobrick was built without Draco.
   NeuroglancerFolder(std::filesystem::path folder, bool sharded);
 
-  /// A sink for the mesh of a segment, which has its place when it is finished.
-  std::unique_ptr<LevelSink> segment(std::uint64_t id, const LevelOptions& options,
-                                     const SegmentProperties& properties);
-  /// Writes what describes the segments. Nothing follows.
-  void finish();
-  /// Bytes written so far, to scratch files as well; those of the output when it is finished.
-  std::uint64_t bytes() const;
+  std::unique_ptr<LevelSink> add_mesh(std::int64_t label, const LevelOptions& options,
+                                      const MeshProperties& properties) override;
+  std::string file_of(std::int64_t label) const override;
+  void finish() override;
+  std::uint64_t bytes() const override;
 
   /// Whether a file of this name, within the folder, belongs to such an output.
   static bool is_own_name(std::string_view name);
@@ -54,15 +44,11 @@ class NeuroglancerFolder {
   std::filesystem::path folder_;
   bool sharded_;
   mutable std::mutex mutex_;
-  std::map<std::uint64_t, SegmentProperties> properties_;
+  std::map<std::uint64_t, MeshProperties> properties_;
   std::string unit_;
   std::uint64_t bytes_ = 0;
   FileWriter collected_;  ///< of segments that wait for their shards
   std::map<std::uint64_t, ShardEntry> entries_;
 };
-
-/// Opens a folder with a mesh as its only segment. See FolderOutput for what it throws.
-std::unique_ptr<MeshSink> create_neuroglancer_mesh(const std::filesystem::path& path, bool force,
-                                                   bool sharded, const LevelOptions& options);
 
 }  // namespace isobrick

@@ -6,7 +6,7 @@
 
 #include "io/bytes/leftovers.h"
 #include "io/bytes/xml_text.h"
-#include "io/meshes/glb_scene.h"
+#include "io/meshes/gltf/glb_scene.h"
 #include "io/meshes/vtp_sink.h"
 #include "temp_dir.h"
 #include "tests/io/meshes/test_meshes.h"

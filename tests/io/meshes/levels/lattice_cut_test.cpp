@@ -35,7 +35,9 @@ std::vector<LatticeTriangle> cut_all(const std::vector<LatticeTriangle>& triangl
   for (const LatticeTriangle& t : triangles) {
     std::set<GridCell> touched;
     cut.for_each_fragment(t, [&](const GridCell& cell) { touched.insert(cell); });
-    cut.for_each_piece(t, [&](const LatticeTriangle& piece, const GridCell& cell) {
+    const CutTriangle corners{{{t[0]}, {t[1]}, {t[2]}}};
+    cut.for_each_piece(corners, [&](const CutTriangle& cut_piece, const GridCell& cell) {
+      const LatticeTriangle piece{cut_piece[0].at, cut_piece[1].at, cut_piece[2].at};
       pieces.push_back(piece);
       for (const LatticePoint& p : piece)
         for (std::size_t axis = 0; axis < 3; ++axis) {

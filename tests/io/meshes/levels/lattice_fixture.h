@@ -4,6 +4,7 @@
 #include <cmath>
 #include <map>
 #include <numbers>
+#include <random>
 #include <utility>
 #include <vector>
 
@@ -72,6 +73,27 @@ inline Mesh make_torus(std::uint32_t around, Vec3f centre = {}, float radius = 4
                           d = i * across + beside;
       triangles.push_back({a, b, c});
       triangles.push_back({a, c, d});
+    }
+  return mesh_of(positions, triangles);
+}
+
+/// A rough sheet just below the plane z = 0.5, which a few vertices cross, and a tetrahedron at z =
+/// 0.
+inline Mesh sheet_below_a_plane() {
+  constexpr std::uint32_t n = 512;
+  std::mt19937 random(3);
+  std::uniform_real_distribution<float> height(0.4985F, 0.49999F);
+  std::vector<Vec3f> positions{{0, 0, 0}, {0.01F, 0, 0}, {0, 0.01F, 0}, {0, 0, 0.01F}};
+  std::vector<Triangle> triangles{{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {2, 0, 3}};
+  for (std::uint32_t i = 0; i <= n; ++i)
+    for (std::uint32_t k = 0; k <= n; ++k)
+      positions.push_back({static_cast<float>(i) / n, static_cast<float>(k) / n,
+                           i % 64 == 32 && k % 64 == 32 ? 0.50001F : height(random)});
+  for (std::uint32_t i = 0; i < n; ++i)
+    for (std::uint32_t k = 0; k < n; ++k) {
+      const std::uint32_t a = 4 + i * (n + 1) + k, b = a + n + 1;
+      triangles.push_back({a, b, b + 1});
+      triangles.push_back({a, b + 1, a + 1});
     }
   return mesh_of(positions, triangles);
 }

@@ -4,12 +4,13 @@
 
 #include <cmath>
 #include <fstream>
-#include <random>
 #include <set>
 
 #include <isobrick/error.h>
 #include <isobrick/mesh_file_sink.h>
+#include "io/meshes/levels/level_fragments.h"
 #include "tests/io/meshes/levels/decoded_levels.h"
+#include "tests/io/meshes/levels/decoded_tiles.h"
 #include "tests/io/meshes/levels/lattice_fixture.h"
 #include "tests/temporary_folder.h"
 
@@ -107,27 +108,6 @@ TEST_F(Neuroglancer, EveryLevelIsTheClosedMesh) {
   check_octree(decoded);
 }
 
-/// A rough sheet just below the plane z = 0.5, which a few vertices cross, and a tetrahedron at z =
-/// 0.
-Mesh sheet_below_a_plane() {
-  constexpr std::uint32_t n = 512;
-  std::mt19937 random(3);
-  std::uniform_real_distribution<float> height(0.4985F, 0.49999F);
-  std::vector<Vec3f> positions{{0, 0, 0}, {0.01F, 0, 0}, {0, 0.01F, 0}, {0, 0, 0.01F}};
-  std::vector<Triangle> triangles{{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {2, 0, 3}};
-  for (std::uint32_t i = 0; i <= n; ++i)
-    for (std::uint32_t k = 0; k <= n; ++k)
-      positions.push_back({static_cast<float>(i) / n, static_cast<float>(k) / n,
-                           i % 64 == 32 && k % 64 == 32 ? 0.50001F : height(random)});
-  for (std::uint32_t i = 0; i < n; ++i)
-    for (std::uint32_t k = 0; k < n; ++k) {
-      const std::uint32_t a = 4 + i * (n + 1) + k, b = a + n + 1;
-      triangles.push_back({a, b, b + 1});
-      triangles.push_back({a, b + 1, a + 1});
-    }
-  return mesh_of(positions, triangles);
-}
-
 TEST_F(Neuroglancer, TheOctreeIsCompleteWhereACoarseLevelMissesCells) {
   const DecodedMesh decoded = save(sheet_below_a_plane(), {.levels = 4});
   check_octree(decoded);
@@ -156,6 +136,32 @@ TEST_F(Neuroglancer, TheFinestLevelHasEveryVertex) {
   }
   // 64 edges of triangles a fragment, of which each has 65535 steps.
   EXPECT_LT(decoded.step(0), decoded.levels[0].scale / 1000);
+}
+
+TEST_F(Neuroglancer, TheFinestLevelHasTheTrianglesOf3dTiles) {
+  const Mesh mesh = make_torus(300, {-20, 5, 1});
+  const DecodedMesh decoded = save(mesh);
+  mesh.save(path("mesh.3dtiles"));
+  const double step = decoded.step(0);
+  std::multiset<LatticeTriangle> expected, found;
+  const auto from_first_corner = [](LatticeTriangle t) {
+    std::ranges::rotate(t, std::ranges::min_element(t));
+    return t;
+  };
+  for (const LatticeTriangle& t : decoded.levels[0].lattice_triangles())
+    expected.insert(from_first_corner(t));
+  const DecodedTileset tiles = decode_tiles(path("mesh.3dtiles"));
+  for (const DecodedTile* tile : tiles.of_level(0))
+    for (const Triangle& t : tile->triangles) {
+      LatticeTriangle points;
+      for (std::size_t corner = 0; corner < 3; ++corner)
+        for (int axis = 0; axis < 3; ++axis)
+          points[corner][static_cast<std::size_t>(axis)] =
+              std::llround(double{tile->stored[t[corner]][axis]} / step);
+      found.insert(from_first_corner(points));
+    }
+  EXPECT_GT(found.size(), mesh.triangles.size());
+  EXPECT_TRUE(found == expected);
 }
 
 TEST_F(Neuroglancer, ThreadsMemoryAndChunksNeverShow) {

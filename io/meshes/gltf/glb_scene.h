@@ -26,7 +26,10 @@ struct Bounds3f {
 /// asset's extras name it ("unit": "micrometer"). The vertices stay in the unit.
 struct GlbVertices {
   bool normals = false, quantized = false;
-  Vec3d origin;     ///< of the grid, world units
+  /// The node turns z, which is up in 3D Tiles, to y, which is up in glTF.
+  bool turns_z_up = false;
+  std::array<double, 3> colour{0.87, 0.8, 0.7};  ///< of the material, in linear light
+  Vec3d origin;                                  ///< of the grid, world units
   double step = 1;  ///< of the grid, the same along all axes, so that normals stay right
   std::string unit = {};
   /// Names of vertex attributes, which become custom ones in capitals: "_TEMPERATURE". Their floats
@@ -36,13 +39,17 @@ struct GlbVertices {
   /// The grid that covers `bounds`.
   void set_grid(const Bounds3f& bounds);
   std::size_t row_bytes() const;
+  /// The same before it is quantized, as append_rows() writes it.
+  std::size_t float_row_bytes() const;
   /// The part of it before the attributes.
   std::size_t vector_bytes() const;
   /// A position as stored; whole numbers on a grid.
   Vec3f stored(Vec3f position) const;
   Bounds3f stored(const Bounds3f& bounds) const;
-  /// Appends rows as append_rows() writes them, at most FileWriter::kBuffer bytes, in
-  /// this form. Returns the bounds of their positions as stored.
+  /// Writes rows as append_rows() has them in this form, row_bytes() each. Returns the bounds of
+  /// their positions as stored.
+  Bounds3f store(std::span<const std::byte> rows, std::byte* to) const;
+  /// Appends rows so, at most FileWriter::kBuffer bytes.
   Bounds3f append(FileWriter& out, std::span<const std::byte> rows) const;
 };
 

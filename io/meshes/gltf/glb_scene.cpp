@@ -1,4 +1,4 @@
-#include "io/meshes/glb_scene.h"
+#include "io/meshes/gltf/glb_scene.h"
 
 #include <fmt/format.h>
 
@@ -10,7 +10,6 @@
 
 #include "core/box_union.h"
 #include "core/length_unit.h"
-#include "io/meshes/vertex_rows.h"
 
 namespace isobrick::inline v0 {
 namespace {
@@ -58,12 +57,30 @@ std::string attribute_name(std::string name) {
   return "_" + name;
 }
 
-ordered_json material() {
-  return {
-      {"pbrMetallicRoughness",
-       {{"baseColorFactor", {0.87, 0.8, 0.7, 1}}, {"metallicFactor", 0}, {"roughnessFactor", 0.7}}},
-      // A surface ends where the volume does, and is then seen from behind.
-      {"doubleSided", true}};
+/// The node of the mesh, which leads to metres.
+ordered_json node_of(const GlbVertices& vertices) {
+  ordered_json node{{"mesh", 0}};
+  const double metres = unit_ratio(vertices.unit, "meter").value_or(1);
+  const double scale = metres * (vertices.quantized ? vertices.step : 1);
+  const Vec3d origin = vertices.quantized ? vertices.origin * metres : Vec3d{};
+  if (vertices.turns_z_up) {
+    // (x, y, z) becomes (x, z, -y), exactly: a quaternion of such an angle is rounded.
+    node["matrix"] = {scale, 0,     0, 0, 0,        0,        -scale,       0,
+                      0,     scale, 0, 0, origin.x, origin.z, 0 - origin.y, 1};
+    return node;
+  }
+  if (vertices.quantized) node["translation"] = {origin.x, origin.y, origin.z};
+  if (scale != 1) node["scale"] = {scale, scale, scale};
+  return node;
+}
+
+ordered_json material(const std::array<double, 3>& colour) {
+  return {{"pbrMetallicRoughness",
+           {{"baseColorFactor", {colour[0], colour[1], colour[2], 1}},
+            {"metallicFactor", 0},
+            {"roughnessFactor", 0.7}}},
+          // A surface ends where the volume does, and is then seen from behind.
+          {"doubleSided", true}};
 }
 
 /// The scene's lists, kept apart: adding to an ordered object moves what it holds.
@@ -154,6 +171,10 @@ std::size_t GlbVertices::vector_bytes() const {
   return (normals ? 2 : 1) * (quantized ? sizeof(Quantized) : sizeof(Vec3f));
 }
 
+std::size_t GlbVertices::float_row_bytes() const {
+  return (normals ? 2 : 1) * sizeof(Vec3f) + attributes.size() * sizeof(float);
+}
+
 std::size_t GlbVertices::row_bytes() const {
   return vector_bytes() + attributes.size() * sizeof(float);
 }
@@ -171,11 +192,10 @@ Bounds3f GlbVertices::stored(const Bounds3f& bounds) const {
   return {stored(bounds.lo), stored(bounds.hi), bounds.empty};
 }
 
-Bounds3f GlbVertices::append(FileWriter& out, std::span<const std::byte> rows) const {
-  const std::size_t from_vectors = isobrick::row_bytes(normals);
-  const std::size_t from_bytes = isobrick::row_bytes(normals, attributes.size());
+Bounds3f GlbVertices::store(std::span<const std::byte> rows, std::byte* to) const {
+  const std::size_t from_bytes = float_row_bytes();
+  const std::size_t from_vectors = from_bytes - attributes.size() * sizeof(float);
   const std::size_t count = rows.size() / from_bytes;
-  std::byte* to = out.reserve(count * row_bytes());
   Bounds3f bounds;
   for (std::size_t i = 0; i < count; ++i, to += row_bytes()) {
     std::array<Vec3f, 2> row;
@@ -191,7 +211,13 @@ Bounds3f GlbVertices::append(FileWriter& out, std::span<const std::byte> rows) c
     }
     std::memcpy(to + vector_bytes(), from + from_vectors, from_bytes - from_vectors);
   }
-  out.commit(count * row_bytes());
+  return bounds;
+}
+
+Bounds3f GlbVertices::append(FileWriter& out, std::span<const std::byte> rows) const {
+  const std::size_t bytes = rows.size() / float_row_bytes() * row_bytes();
+  const Bounds3f bounds = store(rows, out.reserve(bytes));
+  out.commit(bytes);
   return bounds;
 }
 
@@ -202,20 +228,13 @@ std::string glb_json(const GlbVertices& vertices, std::span<const GlbPrimitive> 
   scene["scenes"] = ordered_json::array({ordered_json::object()});
   if (primitives.empty()) return scene.dump();
   scene["scenes"][0]["nodes"] = ordered_json::array({0});
-  ordered_json node{{"mesh", 0}};
-  const double metres = unit_ratio(vertices.unit, "meter").value_or(1);
-  if (vertices.quantized) {
+  if (vertices.quantized)
     for (const char* key : {"extensionsUsed", "extensionsRequired"})
       scene[key] = ordered_json::array({"KHR_mesh_quantization"});
-    const Vec3d origin = vertices.origin * metres;
-    node["translation"] = {origin.x, origin.y, origin.z};
-  }
-  if (const double scale = metres * (vertices.quantized ? vertices.step : 1); scale != 1)
-    node["scale"] = {scale, scale, scale};
   Lists lists;
   for (const GlbPrimitive& primitive : primitives) lists.add(vertices, primitive);
-  scene["nodes"] = ordered_json::array({std::move(node)});
-  scene["materials"] = ordered_json::array({material()});
+  scene["nodes"] = ordered_json::array({node_of(vertices)});
+  scene["materials"] = ordered_json::array({material(vertices.colour)});
   scene["meshes"] = ordered_json::array({{{"primitives", std::move(lists.primitives)}}});
   scene["accessors"] = std::move(lists.accessors);
   scene["bufferViews"] = std::move(lists.views);

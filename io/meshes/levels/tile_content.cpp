@@ -1,0 +1,53 @@
+#include "io/meshes/levels/tile_content.h"
+
+#include <cmath>
+#include <cstring>
+#include <span>
+#include <vector>
+
+#include "core/vectors.h"
+#include "io/meshes/gltf/glb_scene.h"
+
+namespace isobrick::inline v0 {
+namespace {
+
+/// The part of linear light, to four decimals, which are the same with every math library.
+double linear_light(std::uint8_t srgb) {
+  const double value = srgb / 255.0;
+  const double linear = value <= 0.04045 ? value / 12.92 : std::pow((value + 0.055) / 1.055, 2.4);
+  return std::round(linear * 1e4) / 1e4;
+}
+
+}  // namespace
+
+float tile_coordinate(const FragmentPlace& place, std::size_t axis, std::uint16_t step) {
+  const std::int64_t at = std::int64_t{place.cell[axis]} * ChunkGrid::kSteps + step;
+  return static_cast<float>(static_cast<double>(at) * place.grid.edge_of(place.level) /
+                            static_cast<double>(ChunkGrid::kSteps));
+}
+
+std::string tile_glb(const FragmentMesh& mesh, const FragmentPlace& place, const TileForm& form) {
+  if (mesh.triangles.empty()) return {};
+  GlbVertices vertices{.normals = form.normals, .turns_z_up = true, .unit = form.unit};
+  if (form.colour)
+    for (std::size_t i = 0; i < 3; ++i) vertices.colour[i] = linear_light((*form.colour)[i]);
+  std::vector<Vec3f> rows;
+  rows.reserve(mesh.points.size() * (form.normals ? 2 : 1));
+  for (std::size_t i = 0; i < mesh.points.size(); ++i) {
+    const FragmentPoint& point = mesh.points[i];
+    rows.push_back({tile_coordinate(place, 0, point[0]), tile_coordinate(place, 1, point[1]),
+                    tile_coordinate(place, 2, point[2])});
+    // Those at cuts are means of others.
+    if (form.normals) rows.push_back(to_float(unit(to_double(mesh.normals[i]), {0, 0, 1})));
+  }
+  GlbPrimitive primitive{.vertices = mesh.points.size(), .triangles = mesh.triangles.size()};
+  primitive.vertex_bytes = primitive.vertices * vertices.row_bytes();
+  std::string buffer(static_cast<std::size_t>(primitive.bytes()), '\0');
+  primitive.bounds =
+      vertices.store(std::as_bytes(std::span(rows)), reinterpret_cast<std::byte*>(buffer.data()));
+  std::memcpy(buffer.data() + primitive.vertex_bytes, mesh.triangles.data(),
+              mesh.triangles.size() * sizeof(Triangle));
+  return glb_start(glb_json(vertices, {&primitive, 1}), primitive.bytes()) + buffer;
+}
+
+}  // namespace isobrick
