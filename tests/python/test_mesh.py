@@ -119,6 +119,24 @@ def test_levels_of_detail(tmp_path):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a.neuroglancer", "b.neuroglancer"]
 
 
+def test_saves_3d_tiles(tmp_path):
+    mesh = isobrick.extract(ball(), 1, normals=True, unit="mm")
+    mesh.save(tmp_path / "a.3dtiles", levels=3)
+    tileset = json.loads((tmp_path / "a.3dtiles" / "tileset.json").read_text())
+    assert tileset["asset"]["version"] == "1.1"
+    levels = sorted(path.name for path in (tmp_path / "a.3dtiles").iterdir() if path.is_dir())
+    assert levels[0] == "0" and 1 < len(levels) <= 3
+    contents = list((tmp_path / "a.3dtiles").glob("*/*.glb"))
+    assert contents and all(b"NORMAL" in path.read_bytes() for path in contents)
+    for wrong in ({"levels": 0}, {"levels": 17}, {"sharded": True}):
+        with pytest.raises(isobrick.UsageError):
+            mesh.save(tmp_path / "b.3dtiles", **wrong)
+    with pytest.raises(isobrick.UsageError):
+        mesh.save(tmp_path / "a.3dtiles")
+    mesh.save(tmp_path / "a.3dtiles", force=True)
+    assert [path.name for path in tmp_path.iterdir()] == ["a.3dtiles"]
+
+
 def test_progress_of_a_save(tmp_path):
     mesh = isobrick.extract(ball(), 1)
     calls = []

@@ -198,6 +198,8 @@ TEST_F(Force, KeepsWhatIsNoRegularFile) {
                     path(name)},
           Arguments{"extract", store, "--isovalue", "127", "--format", "neuroglancer", "--force",
                     "-o", path(name)},
+          Arguments{"extract", store, "--isovalue", "127", "--format", "3dtiles", "--force", "-o",
+                    path(name)},
           Arguments{"extract", store, "--isovalue", "127", "--force", "--preview", path(name)},
           Arguments{"render", path("a.raw"), "--force", "-o", path(name)}}) {
       const Outcome outcome = run(command);

@@ -208,7 +208,8 @@ class KilledMesh : public Killed {
 TEST_F(KilledMesh, LeavesNothingForever) {
   if (skipped_) GTEST_SKIP();
   const std::set<std::string> before{"a.zarr", "new.raw", "old.raw"};
-  for (const std::string name : {"m.ply", "m.stl", "m.vtp", "m.pvtp", "m.neuroglancer"}) {
+  for (const std::string name :
+       {"m.ply", "m.stl", "m.vtp", "m.pvtp", "m.3dtiles", "m.neuroglancer"}) {
     // One may not be built.
     const bool possible = run(extract(name, "127")).exit_code == 0;
     for (const std::string& made : {name, name + ".parts"}) fs::remove_all(path(made));

@@ -82,6 +82,9 @@ TEST_F(Parts, BecomeLevelsOfDetail) {
   // The folder's name is in its files.
   fs::create_directories(path("one"));
   fs::create_directories(path("parts"));
+  run_json(extract({"-o", path("one/m.3dtiles")}));
+  merge(make_pieces(2), {"-o", path("parts/m.3dtiles")});
+  expect_same(path("one/m.3dtiles"), path("parts/m.3dtiles"));
   const Outcome made = run(extract({"-o", path("one/m.neuroglancer")}));
   if (made.exit_code != 0) GTEST_SKIP() << made.err;  // without Draco
   const auto merged = merge(make_pieces(2), {"-o", path("parts/m.neuroglancer")});
