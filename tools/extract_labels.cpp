@@ -221,7 +221,11 @@ class LabelWriter {
     MeshProperties properties;
     if (const LabelProperties* known = find_properties(label))
       properties = {known->name, known->colour};
-    return levels_->add_mesh(label, {.levels = arguments_.levels, .threads = 1}, properties);
+    return levels_->add_mesh(label,
+                             {.levels = arguments_.levels,
+                              .makes_normals = arguments_.normals != std::optional(false),
+                              .threads = 1},
+                             properties);
   }
 
   /// Writes those that come next, in the order of the labels.

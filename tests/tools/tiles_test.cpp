@@ -144,9 +144,15 @@ TEST_F(TilesCommand, LabelsMayBeNegativeAndHaveColours) {
   const Outcome made = run(
       {"extract", path("seg.zarr"), "--labels", "all", "-o", path("seg"), "--format", "3dtiles"});
   ASSERT_EQ(made.exit_code, 0) << made.err;
-  EXPECT_NE(read_file(path("seg/1/0/0_0_0.glb")).find("\"baseColorFactor\":[1.0,0.2159,0.0,1]"),
-            std::string::npos)
+  const std::string glb = read_file(path("seg/1/0/0_0_0.glb"));
+  EXPECT_NE(glb.find("\"baseColorFactor\":[1.0,0.2159,0.0,1]"), std::string::npos)
       << "linear light";
+  EXPECT_NE(glb.find("NORMAL"), std::string::npos);
+  ASSERT_EQ(run({"extract", path("seg.zarr"), "--labels", "all", "-o", path("flat"), "--format",
+                 "3dtiles", "--normals", "none"})
+                .exit_code,
+            0);
+  EXPECT_EQ(read_file(path("flat/1/0/0_0_0.glb")).find("NORMAL"), std::string::npos);
 }
 
 TEST_F(TilesCommand, RefuseWhatMakesNoSense) {

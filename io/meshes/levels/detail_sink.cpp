@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "core/vectors.h"
 #include "filters/simplify_stage.h"
 #include "io/meshes/levels/level_fragments.h"
 
@@ -71,14 +72,36 @@ DetailSink::DetailSink(std::unique_ptr<LevelWriter> writer, const LevelOptions& 
 MeshSpool DetailSink::make_spool() const { return MeshSpool(place_, options_.memory / 4); }
 
 void DetailSink::begin(const MeshHeader& header) {
-  mesh_.begin({.has_normals = header.has_normals && needs_.normals});
-  writer_->begin(header);
+  lacks_normals_ = needs_.normals && !header.has_normals && options_.makes_normals;
+  MeshHeader of_levels = header;
+  of_levels.has_normals = needs_.normals && (header.has_normals || lacks_normals_);
+  mesh_.begin(of_levels);
+  writer_->begin(of_levels);
 }
 
 void DetailSink::write(const MeshChunk& chunk) {
   MeshChunk plain = chunk;
   if (!needs_.normals) plain.normals = {};
   mesh_.append(plain);
+}
+
+void DetailSink::make_normals() {
+  ScratchArray<Vec3f>&positions = mesh_.positions(), &normals = mesh_.normals();
+  normals.resize(positions.size());
+  mesh_.triangles().for_each_run([&](std::span<const Triangle> run, std::uint64_t) {
+    for (const Triangle& t : run) {
+      const Vec3d a = to_double(positions[t[0]]), b = to_double(positions[t[1]]),
+                  c = to_double(positions[t[2]]);
+      const Vec3f normal = to_float(cross(b - a, c - a));
+      for (const std::uint32_t v : t) {
+        Vec3f& sum = normals.edit(v);
+        sum = sum + normal;
+      }
+    }
+  });
+  normals.edit_runs([](std::span<Vec3f> run, std::uint64_t) {
+    for (Vec3f& n : run) n = to_float(unit(to_double(n), {0, 0, 1}));
+  });
 }
 
 DetailSink::Extent DetailSink::measure(MeshSpool& mesh) const {
@@ -152,6 +175,7 @@ bool DetailSink::simplify() {
 }
 
 void DetailSink::finish() {
+  if (lacks_normals_) make_normals();
   if (mesh_.size().triangles > 0) {
     Extent extent = measure(mesh_);
     choose_grid(extent);

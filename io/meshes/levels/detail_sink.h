@@ -15,8 +15,10 @@ namespace isobrick::inline v0 {
 
 /// How a mesh is divided into levels of detail.
 struct LevelOptions {
-  int levels = 0;   ///< 0: as many as it takes until one fragment has the whole mesh
-  int threads = 0;  ///< 0: all cores; never shows in the bytes
+  int levels = 0;  ///< 0: as many as it takes until one fragment has the whole mesh
+  /// Makes normals of the triangles, weighted by area, for a mesh without any.
+  bool makes_normals = false;
+  int threads = 0;                                 ///< 0: all cores; never shows in the bytes
   std::uint64_t memory = std::uint64_t{16} << 20;  ///< level_memory() takes more
   std::filesystem::path scratch_beside = "-";
   /// Hears of levels, within another stage. It must outlive the sink. Null: nobody.
@@ -54,6 +56,7 @@ class DetailSink final : public LevelSink {
   };
 
   MeshSpool make_spool() const;
+  void make_normals();
   Extent measure(MeshSpool& mesh) const;
   void choose_grid(const Extent& extent);
   void write_level(int level, double edge);
@@ -62,6 +65,7 @@ class DetailSink final : public LevelSink {
 
   std::unique_ptr<LevelWriter> writer_;
   LevelNeeds needs_;
+  bool lacks_normals_ = false;  ///< until they are made
   LevelOptions options_;
   ScratchPlace place_;
   MeshSpool mesh_;

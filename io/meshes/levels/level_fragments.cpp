@@ -10,6 +10,7 @@
 
 #include <isobrick/error.h>
 #include "core/cancel.h"
+#include "io/meshes/levels/lattice_cut.h"
 
 namespace isobrick::inline v0 {
 namespace {
@@ -17,7 +18,7 @@ namespace {
 /// The triangles of a fragment, and what they become.
 struct Fragment {
   EncodedFragment entry;
-  std::vector<CutTriangle> triangles;
+  LoadedTriangles loaded;
   std::string encoded;
 };
 
@@ -28,37 +29,46 @@ struct Encoder {
 
   Encoder(const ChunkGrid& grid, int level, bool has_halves) : cut(grid, level, has_halves) {}
 
-  void encode(Fragment& fragment, const FragmentPlace& place, bool has_normals,
-              const LevelWriter& writer);
+  void encode(Fragment& fragment, const FragmentPlace& place, const LevelWriter& writer);
 };
 
-void Encoder::encode(Fragment& fragment, const FragmentPlace& place, bool has_normals,
-                     const LevelWriter& writer) {
+CutTriangle on_lattice(const LoadedTriangles& loaded, std::size_t i, const FragmentPlace& place) {
+  CutTriangle triangle;
+  for (std::size_t corner = 0; corner < 3; ++corner) {
+    triangle[corner].at = place.grid.quantize(loaded.positions[i][corner], place.level);
+    if (!loaded.normals.empty()) triangle[corner].normal = loaded.normals[i][corner];
+  }
+  return triangle;
+}
+
+void Encoder::encode(Fragment& fragment, const FragmentPlace& place, const LevelWriter& writer) {
   const std::uint32_t halves = cut.halves();
   EncodedFragment& entry = fragment.entry;
   entry.lo.fill(std::numeric_limits<std::uint16_t>::max());
-  welder.begin(fragment.triangles.size(), has_normals);
-  for (const CutTriangle& triangle : fragment.triangles)
-    cut.for_each_piece(triangle, [&](const CutTriangle& piece, const GridCell& cell) {
-      unsigned half = 0;
-      for (std::size_t axis = 0; axis < 3; ++axis) {
-        if (cell[axis] / halves != place.cell[axis]) return;
-        half |= (cell[axis] % halves) << axis;
-      }
-      entry.halves = static_cast<std::uint8_t>(entry.halves | 1U << half);
-      std::array<FragmentPoint, 3> points;
-      for (std::size_t corner = 0; corner < 3; ++corner)
-        for (std::size_t axis = 0; axis < 3; ++axis) {
-          const auto step = static_cast<std::uint16_t>(
-              piece[corner].at[axis] - std::int64_t{place.cell[axis]} * ChunkGrid::kSteps);
-          points[corner][axis] = step;
-          entry.lo[axis] = std::min(entry.lo[axis], step);
-          entry.hi[axis] = std::max(entry.hi[axis], step);
-        }
-      welder.add(points, {piece[0].normal, piece[1].normal, piece[2].normal});
-    });
+  const std::size_t triangles = fragment.loaded.positions.size();
+  welder.begin(triangles, !fragment.loaded.normals.empty());
+  for (std::size_t i = 0; i < triangles; ++i)
+    cut.for_each_piece(
+        on_lattice(fragment.loaded, i, place), [&](const CutTriangle& piece, const GridCell& cell) {
+          unsigned half = 0;
+          for (std::size_t axis = 0; axis < 3; ++axis) {
+            if (cell[axis] / halves != place.cell[axis]) return;
+            half |= (cell[axis] % halves) << axis;
+          }
+          entry.halves = static_cast<std::uint8_t>(entry.halves | 1U << half);
+          std::array<FragmentPoint, 3> points;
+          for (std::size_t corner = 0; corner < 3; ++corner)
+            for (std::size_t axis = 0; axis < 3; ++axis) {
+              const auto step = static_cast<std::uint16_t>(
+                  piece[corner].at[axis] - std::int64_t{place.cell[axis]} * ChunkGrid::kSteps);
+              points[corner][axis] = step;
+              entry.lo[axis] = std::min(entry.lo[axis], step);
+              entry.hi[axis] = std::max(entry.hi[axis], step);
+            }
+          welder.add(points, {piece[0].normal, piece[1].normal, piece[2].normal});
+        });
   fragment.encoded = writer.encode(welder.mesh(), place);
-  fragment.triangles = {};
+  fragment.loaded = {};
 }
 
 }  // namespace
@@ -130,24 +140,27 @@ void LevelFragments::sort() {
   for_each_touched([&](const Triangle& t, Run& run) { sorted_.edit(run.end++) = t; });
 }
 
-std::vector<CutTriangle> LevelFragments::load(const Run& run, bool has_normals) {
-  std::vector<CutTriangle> triangles;
-  triangles.reserve(static_cast<std::size_t>(run.size()));
+LoadedTriangles LevelFragments::load(const Run& run) {
+  LoadedTriangles loaded;
+  const bool has_normals = mesh_.has_normals();
+  loaded.positions.reserve(static_cast<std::size_t>(run.size()));
+  if (has_normals) loaded.normals.reserve(static_cast<std::size_t>(run.size()));
   sorted_.for_each_run(run.begin, run.end, [&](std::span<const Triangle> part, std::uint64_t) {
     for (const Triangle& t : part) {
-      CutTriangle& corners = triangles.emplace_back();
-      for (std::size_t corner = 0; corner < 3; ++corner) {
-        corners[corner].at = grid_.quantize(mesh_.positions()[t[corner]], level_);
-        if (has_normals) corners[corner].normal = mesh_.normals()[t[corner]];
-      }
+      auto& corners = loaded.positions.emplace_back();
+      for (std::size_t corner = 0; corner < 3; ++corner)
+        corners[corner] = mesh_.positions()[t[corner]];
+      if (!has_normals) continue;
+      auto& normals = loaded.normals.emplace_back();
+      for (std::size_t corner = 0; corner < 3; ++corner)
+        normals[corner] = mesh_.normals()[t[corner]];
     }
   });
-  return triangles;
+  return loaded;
 }
 
 std::vector<EncodedFragment> LevelFragments::encode(LevelWriter& writer) {
   sort();
-  const bool has_normals = mesh_.has_normals();
   tbb::task_arena arena(work_.threads > 0 ? work_.threads : tbb::task_arena::automatic);
   tbb::enumerable_thread_specific<Encoder> encoders(
       [&] { return Encoder(grid_, level_, writer.needs().halves); });
@@ -161,11 +174,11 @@ std::vector<EncodedFragment> LevelFragments::encode(LevelWriter& writer) {
     std::uint64_t triangles = 0;
     do {
       triangles += at->second.size();
-      batch.push_back({.entry = {.key = at->first}, .triangles = load(at->second, has_normals)});
+      batch.push_back({.entry = {.key = at->first}, .loaded = load(at->second)});
     } while (++at != runs_.cend() && triangles + at->second.size() <= work_.triangles_at_once);
     arena.execute([&] {
       tbb::parallel_for(std::size_t{0}, batch.size(), [&](std::size_t i) {
-        encoders.local().encode(batch[i], place_of(batch[i]), has_normals, writer);
+        encoders.local().encode(batch[i], place_of(batch[i]), writer);
       });
     });
     advance(triangles);

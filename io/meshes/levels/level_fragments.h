@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <map>
 #include <vector>
@@ -8,7 +9,6 @@
 #include "filters/mesh_spool.h"
 #include "filters/scratch_array.h"
 #include "io/meshes/levels/chunk_lattice.h"
-#include "io/meshes/levels/lattice_cut.h"
 #include "io/meshes/levels/level_writer.h"
 
 namespace isobrick::inline v0 {
@@ -26,6 +26,12 @@ struct FragmentWork {
   std::uint64_t triangles_at_once = 0;
   int threads = 0;               ///< 0: all cores
   Progress* progress = nullptr;  ///< never null; bytes of each triangle three times
+};
+
+/// Triangles of a fragment and what they have at their corners.
+struct LoadedTriangles {
+  std::vector<std::array<Vec3f, 3>> positions;
+  std::vector<std::array<Vec3f, 3>> normals;  ///< empty, or as many
 };
 
 /// The triangles of a level's mesh, sorted by the fragments that they touch.
@@ -57,7 +63,7 @@ class LevelFragments {
   void for_each_touched(F&& f);
   void sort();
   LatticeTriangle on_lattice(const Triangle& triangle);
-  std::vector<CutTriangle> load(const Run& run, bool has_normals);
+  LoadedTriangles load(const Run& run);
 
   MeshSpool& mesh_;
   ChunkGrid grid_;

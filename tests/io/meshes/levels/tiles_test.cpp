@@ -252,6 +252,27 @@ TEST_F(Tiles, NormalsAreThoseOfTheMesh) {
   for (const DecodedTile& tile : save(make_torus(60)).tiles) EXPECT_TRUE(tile.normals.empty());
 }
 
+TEST_F(Tiles, NormalsAreMadeWhereTheMeshHasNone) {
+  const Mesh torus = make_torus(120);
+  const auto made = [&](const Mesh& mesh, bool makes_normals) {
+    const auto sink = create_level_mesh(path(), true, {.as_tiles = true},
+                                        {.levels = 2, .makes_normals = makes_normals});
+    sink->begin({.has_normals = !mesh.normals.empty()});
+    sink->write(mesh.chunk());
+    sink->finish();
+    return decode_tiles(path());
+  };
+  const DecodedTileset expected = made(with_normals(make_torus(120)), false),
+                       found = made(torus, true);
+  ASSERT_EQ(found.tiles.size(), expected.tiles.size());
+  for (std::size_t i = 0; i < found.tiles.size(); ++i) {
+    ASSERT_EQ(found.tiles[i].normals.size(), expected.tiles[i].normals.size());
+    for (std::size_t k = 0; k < found.tiles[i].normals.size(); ++k)
+      EXPECT_GT(dot(found.tiles[i].normals[k], expected.tiles[i].normals[k]), 0.9999F);
+  }
+  for (const DecodedTile& tile : made(torus, false).tiles) EXPECT_TRUE(tile.normals.empty());
+}
+
 TEST_F(Tiles, TheWorldIsInMetres) {
   Mesh mesh = make_torus(200, {1000, 0, 0});
   mesh.unit = "millimeter";
