@@ -66,8 +66,8 @@ std::uint32_t RowSlots::find(Int3 tile) const {
 }
 
 void RowSlots::find_around(Int3 tile, TileNeighbours& around) const {
-  for (std::uint8_t n = 0; n < std::size(around.slots); ++n) {
-    const Int3 other = tile + offset_of(n);
+  for (std::size_t n = 0; n < std::size(around.slots); ++n) {
+    const Int3 other = tile + offset_of(static_cast<std::uint8_t>(n));
     const bool exists = min(other, Int3{0, 0, 0}) == Int3{0, 0, 0};
     around.slots[n] = exists && other != tile ? find(other) : kNone;
   }
