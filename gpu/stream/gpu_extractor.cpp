@@ -18,8 +18,7 @@ namespace {
 
 SurfaceOptions checked(const Lattice& lattice, SurfaceOptions options) {
   check_supported(options);
-  options.may_have_nan = options.may_have_nan && is_floating(lattice.type);
-  options.drop_degenerate = leaves_out_degenerate(lattice.type, options);
+  options = options_that_matter(lattice.type, options);
   if (std::isnan(options.isovalue)) throw UsageError("the isovalue is not a number");
   options.roi = intersect(options.roi, lattice.box());
   if (options.roi.empty()) throw UsageError("the region of interest holds no sample");

@@ -75,8 +75,9 @@ std::uint64_t pool_pinned_bytes(const Lattice& lattice, const PoolSizes& pool) {
                                  pool.packed);
 }
 
-StreamSizes stream_sizes(const Lattice& lattice, const SurfaceOptions& options, std::uint32_t tiles,
+StreamSizes stream_sizes(const Lattice& lattice, const SurfaceOptions& given, std::uint32_t tiles,
                          int in_flight, PoolSizes pool) {
+  const SurfaceOptions options = options_that_matter(lattice.type, given);
   StreamSizes s;
   s.pool = pool;
   const auto in_flight_count = static_cast<std::uint64_t>(in_flight);
@@ -88,7 +89,7 @@ StreamSizes stream_sizes(const Lattice& lattice, const SurfaceOptions& options, 
       slots_for(lattice, options.indexing == Indexing::welded, tiles, in_flight));
   s.tile_bricks = static_cast<std::uint32_t>(max_bricks_of_tile(lattice, sample_reach(options)));
   if (pool.bricks == 0) s.sent_bricks = static_cast<std::uint32_t>(bricks_to_send(lattice, tiles));
-  const bool leaves_out = leaves_out_degenerate(lattice.type, options);
+  const bool leaves_out = options.drop_degenerate;
   s.staging_bytes = StagingLayout(tiles, s.tile_bricks, leaves_out).end;
   if (leaves_out) s.coincident_blocks = std::min<std::uint32_t>(tiles, kMaxCoincidentBlocks);
   s.output_bytes = MeshArrays::bytes(s.vertices, s.triangles, options.normals);

@@ -23,6 +23,14 @@ inline bool leaves_out_degenerate(ScalarType type, const SurfaceOptions& options
   return options.drop_degenerate && has_coincident(type, options.isovalue);
 }
 
+/// The options of a surface without what makes no difference for samples of the type. Buffers, the
+/// search for bricks and kernels go by the same ones.
+inline SurfaceOptions options_that_matter(ScalarType type, SurfaceOptions options) {
+  options.may_have_nan = options.may_have_nan && is_floating(type);
+  options.drop_degenerate = leaves_out_degenerate(type, options);
+  return options;
+}
+
 /// Throws UsageError with that line.
 inline void check_supported(const SurfaceOptions& options) {
   if (const auto why = why_unsupported(options)) throw UsageError(*why);

@@ -47,6 +47,22 @@ TEST(StreamSizes, TheLeastBudgetWorksAndLessIsRefusedByName) {
   EXPECT_LT(least.device_bytes, 32 * kMiB);
 }
 
+/// What finds the bricks of tiles goes by the same reach.
+TEST(StreamSizes, OptionsThatMakeNoDifferenceDoNotCount) {
+  const Lattice lattice{{1024, 1024, 1024}, {32, 32, 32}, ScalarType::u16};
+  const auto tile_bricks = [&](const SurfaceOptions& options) {
+    return gpu::stream_sizes(lattice, options, 4).tile_bricks;
+  };
+  const SurfaceOptions plain{.isovalue = 0.5, .roi = lattice.box()};
+  SurfaceOptions dropping = plain, missing = plain;
+  dropping.drop_degenerate = true;
+  missing.may_have_nan = true;
+  EXPECT_EQ(tile_bricks(dropping), tile_bricks(plain));
+  EXPECT_EQ(tile_bricks(missing), tile_bricks(plain));
+  dropping.isovalue = 1;
+  EXPECT_GT(tile_bricks(dropping), tile_bricks(plain));
+}
+
 TEST(StreamSizes, APoolIsTakenWhereMostOfItFits) {
   const SurfaceOptions options{.roi = kLattice.box()};
   const gpu::PoolSizes wanted{gpu::preferred_pool_bricks(kLattice, 16), 16};
