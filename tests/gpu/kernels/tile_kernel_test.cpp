@@ -201,7 +201,7 @@ TYPED_TEST(TileKernel, DegenerateTrianglesOfARegion) {
   }
 }
 
-/// Where eight tiles meet, whoever of them has the first triangle.
+/// Where eight tiles meet, each of which may have the first triangle.
 TEST(TileKernelOf, DegenerateTrianglesAtTheCornerOfEightTiles) {
   SurfaceOptions options;
   options.drop_degenerate = true;
