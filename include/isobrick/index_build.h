@@ -64,9 +64,9 @@ ISOBRICK_API void check_index_options(const IndexOptions& options, const Lattice
 /// that it lacks are computed first, and with `force` those of an image of others
 /// again. An index grows as KIND.partial beside its place and moves there once it
 /// is whole; until then the store is as it was. Throws UsageError when there is
-/// one and neither `resume` nor `force` is set. Throws it where the budget is too small, too, and
-/// names the least that does. Throws Error when another process is at it, and where parts to join
-/// are missing or are of the store as it was before something in it changed.
+/// one and neither `resume` nor `force` is set, and where parts to join are missing or are of the
+/// store as it was before something in it changed. Throws it where the budget is too small, too,
+/// and names the least that does. Throws Error when another process is at it.
 ISOBRICK_API IndexReport add_index(const std::filesystem::path& store, const IndexOptions& options,
                                    Progress& progress = no_progress());
 

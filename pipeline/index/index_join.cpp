@@ -75,7 +75,7 @@ JoinedIndexParts::JoinedIndexParts(const StoreReader& store, const IndexOptions&
     }
   }
   if (missing.empty()) return;
-  throw Error(fmt::format(
+  throw UsageError(fmt::format(
       "'{}' has no whole part{} {} of the store as it is now; index it with the same options and "
       "--part {}/{}",
       parts_.folder().string(), missing.size() == 1 ? "" : "s", numbers_of_parts(missing),

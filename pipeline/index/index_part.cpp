@@ -166,8 +166,8 @@ IndexReport make_index_part(const StoreReader& store, const IndexOptions& option
   // Parts beside an index that is there wait for the join that made it to go on.
   if (is_there && parts.has_rest()) return {};
   if (is_there)
-    throw UsageError(fmt::format("'{}' has a {} index; --force replaces it", store.info().name,
-                                 name_of(options.kind)));
+    throw UsageError(fmt::format("'{}' has the {} index already; --force replaces it",
+                                 store.info().name, name_of(options.kind)));
   IndexReport report;
   report.ranges_added = needs_ranges(store, options);
   if (report.ranges_added) {

@@ -107,8 +107,8 @@ void LevelIndex::check() const {
   if (options_.force) return;
   const bool finished = is_finished();
   if (fs::exists(place_) && !finished)
-    throw UsageError(
-        fmt::format("'{}' has a {} index; --force replaces it", store_.info().name, layout_.kind));
+    throw UsageError(fmt::format("'{}' has the {} index already; --force replaces it",
+                                 store_.info().name, layout_.kind));
   // Beside a finished one it is the one that was replaced.
   if (finished || !fs::exists(partial_)) return;
   if (!options_.resume)

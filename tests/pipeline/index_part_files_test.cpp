@@ -197,7 +197,7 @@ TEST_F(IndexPartFiles, ReplaceAnIndexOnlyWithForce) {
   const fs::path store = folder_ / "foreign", one = folder_ / "one";
   write_foreign(store, extent, {20, 20, 20}, samples);
   add_index_quietly(store, {.leaf = 4});
-  const std::string has = "usage: '" + store.string() + "' has a octree index; --force";
+  const std::string has = "usage: '" + store.string() + "' has the octree index already; --force";
   EXPECT_EQ(refusal([&] { make_part(store, {.leaf = 4}, {1, 2}); }).find(has), 0u);
   EXPECT_EQ(refusal([&] { make_part(store, {.leaf = 8}, {1, 2}); }).find(has), 0u);
   EXPECT_FALSE(fs::exists(parts_of(store)));

@@ -101,14 +101,15 @@ TEST_F(IndexPartsCommand, WhatCannotBeIsRefused) {
   expect_refused(run({"index", store, "--part", "1/2", "--memory", "1M"}), 2, {"memory budget"});
   expect_refused(run({"index", path("none.zarr"), "--part", "1/2"}), 1, {"none.zarr"});
   expect_refused(run({"index", "https://localhost:1/a.zarr", "--part", "1/2"}), 2, {"URL"});
-  expect_refused(run({"index", store, "--join", "2"}), 1,
+  expect_refused(run({"index", store, "--join", "2"}), 2,
                  {"has no whole parts 1, 2 of the store as it is now", "--part 1/2"});
   EXPECT_TRUE(files_of("x.zarr") == before);
   run_json({"index", store, "--part", "2/2"});
-  expect_refused(run({"index", store, "--join", "2"}), 1, {"has no whole part 1 of the store"});
+  expect_refused(run({"index", store, "--join", "2"}), 2, {"has no whole part 1 of the store"});
   run_json({"index", store, "--part", "1/2"});
   run_json({"index", store + "/", "--join", "2"});
-  expect_refused(run({"index", store, "--part", "1/2"}), 2, {"has a octree index; --force"});
+  expect_refused(run({"index", store, "--part", "1/2"}), 2,
+                 {"has the octree index already; --force"});
   EXPECT_EQ(files(), std::vector<std::string>{"x.zarr"});
 }
 
@@ -123,7 +124,7 @@ TEST_F(IndexPartsCommand, AStoreThatChangedBetweenPartsIsRefused) {
         break;
       }
     run_json({"index", store, "--leaf", leaf, "--part", "2/2"});
-    expect_refused(run({"index", store, "--leaf", leaf, "--join", "2"}), 1,
+    expect_refused(run({"index", store, "--leaf", leaf, "--join", "2"}), 2,
                    {"has no whole part 1 of the store as it is now"});
   }
   EXPECT_FALSE(fs::exists(store + "/isobrick/ranges.json"));
@@ -152,7 +153,7 @@ TEST_F(IndexPartsCommand, ThatAreKilledAreRepeated) {
         // What a killed task left is repeated, unless it was whole.
         const Outcome outcome = run(joining);
         if (outcome.exit_code != 0) {
-          expect_refused(outcome, 1, {"has no whole part 1 of"});
+          expect_refused(outcome, 2, {"has no whole part 1 of"});
           EXPECT_EQ(run(part("1")).exit_code, 0) << at;
           EXPECT_EQ(run(joining).exit_code, 0) << at;
         }

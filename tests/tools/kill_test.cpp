@@ -173,7 +173,7 @@ TEST_F(Killed, AnIndexIsResumed) {
         const Outcome outcome = run(with({"--resume"}));
         if (outcome.exit_code != 0) {
           EXPECT_TRUE(replaces);
-          expect_refused(outcome, 2, {"has a octree index; --force"});
+          expect_refused(outcome, 2, {"has the octree index already; --force"});
           succeeds(with({"--resume", "--force"}), at);
         }
         EXPECT_TRUE(tree(path("out.zarr")) == expected) << replaces << ' ' << at;

@@ -175,7 +175,8 @@ TEST_F(MpiIndex, IsThatOfOneProcess) {
   expect_same_stores("ranks.zarr", "one.zarr");
   const Outcome again = mpirun(3, {"index", path("ranks.zarr"), "--leaf", "8"});
   EXPECT_EQ(again.exit_code, 2);
-  EXPECT_NE(again.err.find("has a octree index; --force"), std::string::npos) << again.err;
+  EXPECT_NE(again.err.find("has the octree index already; --force"), std::string::npos)
+      << again.err;
   const Outcome alone =
       mpirun(2, {"index", path("ranks.zarr"), "--mpi", "off", "--part", "1/1", "--force"});
   EXPECT_EQ(alone.exit_code, 0) << alone.err;
@@ -210,7 +211,7 @@ TEST_F(MpiIndex, AKilledRankEndsTheJob) {
         }
         const Outcome again = mpirun(2, index);
         if (again.exit_code != 0) {  // nothing was left to do
-          EXPECT_NE(again.err.find("has a octree index"), std::string::npos) << again.err;
+          EXPECT_NE(again.err.find("has the octree index already"), std::string::npos) << again.err;
         }
       }
       expect_same_stores("ranks.zarr", "one.zarr");
