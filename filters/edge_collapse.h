@@ -111,7 +111,7 @@ class EdgeCollapse {
   std::vector<std::uint32_t> gone_;
 };
 
-/// Which vertex each one of a group becomes by collapses; those that stay become themselves.
+/// Which vertex each one of a group becomes by collapses; one that is in no collapse becomes itself.
 std::vector<std::uint32_t> final_vertices(const TriangleGroup& group,
                                           std::span<const Collapse> collapses);
 

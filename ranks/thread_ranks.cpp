@@ -1,7 +1,6 @@
 #include "ranks/thread_ranks.h"
 
 #include <fcntl.h>
-#include <unistd.h>
 
 #include <cerrno>
 #include <condition_variable>
@@ -12,6 +11,7 @@
 #include <utility>
 
 #include <isobrick/error.h>
+#include "io/bytes/output_file.h"
 
 namespace isobrick::inline v0 {
 namespace {
@@ -74,27 +74,21 @@ class ThreadJob {
 class ThreadFile final : public SharedFile {
  public:
   ThreadFile(ThreadJob& job, const std::filesystem::path& path)
-      : job_(job), path_(path.string()), file_(::open(path.c_str(), O_WRONLY | O_CLOEXEC)) {
-    if (file_ < 0) throw system_error("open", path_, errno);
+      : job_(job), file_(UniqueFd(::open(path.c_str(), O_WRONLY | O_CLOEXEC)), path) {
+    if (!file_) throw system_error("open", path.string(), errno);
   }
-  ~ThreadFile() override { ::close(file_); }
 
   void write_at(std::uint64_t offset, std::span<const std::byte> bytes) override {
-    while (!bytes.empty()) {
-      const ssize_t written =
-          ::pwrite(file_, bytes.data(), bytes.size(), static_cast<off_t>(offset));
-      if (written < 0 && errno == EINTR) continue;
-      if (written <= 0) throw system_error("write to", path_, written < 0 ? errno : EIO);
-      bytes = bytes.subspan(static_cast<std::size_t>(written));
-      offset += static_cast<std::uint64_t>(written);
-    }
+    file_.write_at(offset, bytes);
   }
-  void close() override { job_.wait_for_all(); }
+  void close() override {
+    FileWriter(std::move(file_)).finish();  // what is told only when a file is closed
+    job_.wait_for_all();
+  }
 
  private:
   ThreadJob& job_;
-  std::string path_;
-  int file_;
+  File file_;
 };
 
 class ThreadRanks final : public Ranks {

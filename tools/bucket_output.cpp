@@ -56,11 +56,10 @@ BucketFile::BucketFile(const std::string& url, bool force, std::uint64_t memory)
     : upload_(of_bucket(url), upload_options(force, memory)) {}
 
 void BucketFile::upload(Progress& progress) {
-  std::vector<std::filesystem::path> files;
+  std::vector<std::filesystem::path> beside;
   for (const auto& entry : std::filesystem::directory_iterator(scratch_.path()))
-    files.push_back(entry.path());
-  std::sort(files.begin(), files.end());
-  upload_.run(files, progress);
+    if (entry.path() != path()) beside.push_back(entry.path());
+  upload_.run(path(), beside, progress);
 }
 
 }  // namespace isobrick::tools

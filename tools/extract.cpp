@@ -258,8 +258,10 @@ int run_extract(const ExtractArguments& given, Console& console) {
                       {"level", surfaces.front().options.level},
                       {"estimate", arguments.estimate},
                       {"surfaces", output.objects}};
-  if (!arguments.estimate) result["passes"] = output.passes;
-  if (arguments.devices.size() > 1) result["devices"] = arguments.devices;
+  if (!arguments.estimate) {
+    result["passes"] = output.passes;
+    if (arguments.devices.size() > 1) result["devices"] = arguments.devices;
+  }
   add_peak(job, result);
   console.result(result, output.text);
   return 0;

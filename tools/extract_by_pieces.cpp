@@ -295,6 +295,14 @@ void check_outputs_of(const ExtractArguments& arguments,
 
 }  // namespace
 
+void check_piece_arguments(const ExtractArguments& arguments, std::string_view reason) {
+  if (!arguments.preview.path.empty())
+    throw UsageError(
+        fmt::format("{}: --preview is not made by way of pieces: leave out one of them", reason));
+  if (is_standard_output(arguments.output))
+    throw UsageError(fmt::format("{}: pieces lie beside the mesh: name a file with -o", reason));
+}
+
 CommandOutput make_by_pieces(const ExtractArguments& arguments,
                              const std::vector<ExtractedSurface>& surfaces,
                              const StoreReader& store, Ranks* job, Console& console) {

@@ -10,14 +10,6 @@
 
 namespace isobrick::tools {
 
-void check_piece_arguments(const ExtractArguments& arguments, std::string_view reason) {
-  if (!arguments.preview.path.empty())
-    throw UsageError(
-        fmt::format("{}: --preview is not made by way of pieces: leave out one of them", reason));
-  if (is_standard_output(arguments.output))
-    throw UsageError(fmt::format("{}: pieces lie beside the mesh: name a file with -o", reason));
-}
-
 void choose_device(const Ranks& job, ExtractArguments& arguments) {
   std::vector<int>& devices = arguments.devices;
   if (devices.empty() && arguments.backend == Backend::cuda)

@@ -76,7 +76,7 @@ ResidentLauncher::ResidentLauncher(DeviceVolume::Impl& volume, const SurfaceOpti
     : volume_(volume),
       options_(checked(options, volume.lattice)),
       tuning_(tuning),
-      shapes_(launch_shapes(kernel_without(false))),
+      shapes_(launch_shapes(kernel_for(false))),
       cases_(1, volume.stream),
       items_(volume.tile_count, volume.stream),
       slot_of_tile_(volume.grid_tiles(), volume.stream),
@@ -91,7 +91,7 @@ ResidentLauncher::ResidentLauncher(DeviceVolume::Impl& volume, const SurfaceOpti
   static_assert(kNone == 0xffffffffu);
   check(cudaMemsetAsync(slot_of_tile_.data(), 0xff, slot_of_tile_.bytes(), stream));
   if (options_.drop_degenerate) {
-    coincident_shapes_ = launch_shapes(kernel_without(true));
+    coincident_shapes_ = launch_shapes(kernel_for(true));
     const int blocks = coincident_shapes_->shapes[0].blocks;
     work_ = DeviceBuffer<CoincidentWork>(
         std::min(volume.tile_count, static_cast<std::uint32_t>(blocks)), volume.stream);
@@ -99,10 +99,9 @@ ResidentLauncher::ResidentLauncher(DeviceVolume::Impl& volume, const SurfaceOpti
   make_row_tables(std::min(volume.tile_count, kFirstRowTables));
 }
 
-/// The kernel that makes the surface, with degenerate triangles or without.
-TileKernel ResidentLauncher::kernel_without(bool degenerate) const {
+TileKernel ResidentLauncher::kernel_for(bool drop_degenerate) const {
   TileKernel kernel = kernel_of(volume_.lattice.type, options_);
-  kernel.drop_degenerate = degenerate;
+  kernel.drop_degenerate = drop_degenerate;
   return kernel;
 }
 

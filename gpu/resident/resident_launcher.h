@@ -67,7 +67,7 @@ class ResidentLauncher {
   void launch_search(double isovalue);
   void launch_tiles(double isovalue, const MeshRoom& room, const DeviceCounts& last);
   LaunchEnd launch_end() const;
-  TileKernel kernel_without(bool degenerate) const;
+  TileKernel kernel_for(bool drop_degenerate) const;
   LaunchShape shape_for(double isovalue, const DeviceCounts& last) const;
   bool read_report(DeviceCounts& counts, std::uint32_t& blocks) const;
 

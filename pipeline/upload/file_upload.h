@@ -18,18 +18,13 @@ class FileUpload {
 
   /// The name of the object within its place.
   const std::string& name() const { return name_; }
-  /// Uploads files, each under its own name beside the object of the URL. Returns their bytes.
-  std::uint64_t run(const std::vector<std::filesystem::path>& files, Progress& progress);
-  /// Uploads a file as the object of the URL.
-  std::uint64_t run(const std::filesystem::path& file, Progress& progress);
+  /// Uploads a file as the object of the URL, and others beside it under their own names. Returns
+  /// their bytes.
+  std::uint64_t run(const std::filesystem::path& file,
+                    const std::vector<std::filesystem::path>& beside, Progress& progress);
 
  private:
-  struct Object {
-    std::string key;
-    std::filesystem::path file;
-  };
   void check_absent(const std::string& key);
-  std::uint64_t put(const std::vector<Object>& objects, Progress& progress);
 
   std::string name_;
   bool force_;

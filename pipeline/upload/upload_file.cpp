@@ -1,5 +1,7 @@
 #include <isobrick/upload.h>
 
+#include <utility>
+
 #include <fmt/format.h>
 
 #include <isobrick/error.h>
@@ -47,25 +49,19 @@ void FileUpload::check_absent(const std::string& key) {
     throw UsageError(fmt::format("'{}/{}' exists; --force replaces it", writer_.name(), key));
 }
 
-std::uint64_t FileUpload::run(const std::vector<fs::path>& files, Progress& progress) {
-  std::vector<Object> objects;
-  for (const fs::path& file : files) {
-    objects.push_back({file.filename().string(), file});
-    if (objects.back().key != name_) check_absent(objects.back().key);
-  }
-  return put(objects, progress);
-}
-
-std::uint64_t FileUpload::run(const fs::path& file, Progress& progress) {
-  return put({{name_, file}}, progress);
-}
-
-std::uint64_t FileUpload::put(const std::vector<Object>& objects, Progress& listener) {
+std::uint64_t FileUpload::run(const fs::path& file, const std::vector<fs::path>& beside,
+                              Progress& listener) {
   CancellableProgress progress(listener, cancel_);
+  std::vector<std::pair<std::string, File>> objects;
+  for (const fs::path& other : beside) {
+    objects.emplace_back(other.filename().string(), open_input(other));
+    check_absent(objects.back().first);
+  }
+  objects.emplace_back(name_, open_input(file));
   std::uint64_t bytes = 0;
-  for (const Object& object : objects) bytes += open_input(object.file).size();
+  for (const auto& [key, from] : objects) bytes += from.size();
   progress.begin("upload", bytes);
-  for (const Object& object : objects) writer_.put(object.key, open_input(object.file), progress);
+  for (const auto& [key, from] : objects) writer_.put(key, from, progress);
   writer_.wait(progress);
   progress.end();
   return bytes;
@@ -73,7 +69,7 @@ std::uint64_t FileUpload::put(const std::vector<Object>& objects, Progress& list
 
 std::uint64_t upload_file(const fs::path& file, const std::string& url,
                           const UploadOptions& options, Progress& progress) {
-  return FileUpload(url, options).run(file, progress);
+  return FileUpload(url, options).run(file, {}, progress);
 }
 
 }  // namespace isobrick
