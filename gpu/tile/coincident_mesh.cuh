@@ -121,10 +121,12 @@ __device__ inline void write_kept_triangles(const TileShared& s, const TileParam
         const std::uint32_t vertex = vertex_on(edges >> (3 + 4 * c) & 15u, at);
         const auto corner = static_cast<int>(vertex);
         const std::uint32_t number =
-            vertex < 8 ? number_of_sample(s, p, w, row + (corner >> 1 & 1) + 33 * (corner >> 2),
-                                          x + (corner & 1))
-                       : number_on_edge(s, places, static_cast<std::uint32_t>(x),
-                                        4 * static_cast<std::uint32_t>(row), vertex - 8);
+            vertex < 8
+                ? number_of_sample(s, p, w, row + (corner >> 1 & 1) + 33 * (corner >> 2),
+                                   x + (corner & 1))
+                : number_on_edge(
+                      s, 8 * (vertex - 8) | places_of(s, places, static_cast<std::uint32_t>(x)),
+                      4 * static_cast<std::uint32_t>(row), low_bits(static_cast<std::uint32_t>(x)));
         __stcs(&(*to)[static_cast<std::size_t>(c)], number);
       }
     }

@@ -44,7 +44,7 @@ struct CoincidentWork {
 inline constexpr int kMaxCoincidentBlocks = 512;
 
 struct CoincidentParams {
-  CoincidentWork* work;              ///< one a block of threads; null: no triangle is left out
+  CoincidentWork* work;              ///< one a block of threads
   SampleTable* tables;               ///< one a slot
   const TileNeighbours* neighbours;  ///< one an item where there are TileLinks
   unsigned long long* left_out;      ///< triangles, zeroed

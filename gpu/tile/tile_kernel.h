@@ -4,6 +4,7 @@
 
 #include <isobrick/scalar.h>
 #include <isobrick/surface_options.h>
+#include "gpu/tile/supported.h"
 #include "gpu/tile/tile_params.h"
 
 namespace isobrick::inline v0::gpu {
@@ -15,10 +16,9 @@ struct TileKernel {
   bool may_have_nan = false;  ///< of f32 and f64 only
   bool drop_degenerate = false;
 };
-/// If degenerate triangles are left out, this one is for isovalues that samples can equal.
-inline TileKernel kernel_of(ScalarType type, const SurfaceOptions& options) {
-  return {type, options.normals, options.may_have_nan && is_floating(type),
-          options.drop_degenerate};
+inline TileKernel kernel_of(ScalarType type, const SurfaceOptions& given) {
+  const SurfaceOptions options = options_that_matter(type, given);
+  return {type, options.normals, options.may_have_nan, options.drop_degenerate};
 }
 
 /// A kernel as it is launched: the number of its thread blocks that fill the device and their size.

@@ -48,40 +48,36 @@ __device__ inline EdgePlace place_at(std::uint32_t address) {
   return place;
 }
 
-/// The number in the mesh of the vertex on an edge of a cell at `x`. `row` is four times that of
-/// the cell, `places` the address of the table.
-__device__ inline std::uint32_t number_on_edge(const TileShared& s, std::uint32_t places,
-                                               std::uint32_t x, std::uint32_t row,
-                                               std::uint32_t edge) {
+/// Where the places of the edges of a cell at `x` begin. `places` is the address of the table.
+__device__ inline std::uint32_t places_of(const TileShared& s, std::uint32_t places,
+                                          std::uint32_t x) {
+  return x == 0 ? places + static_cast<std::uint32_t>(sizeof s.places[0]) : places;
+}
+
+/// The number in the mesh of the vertex on an edge of a cell. `place` is the address of the edge's
+/// place, `row` four times the cell's row, `mask` the bits below its x.
+__device__ inline std::uint32_t number_on_edge(const TileShared& s, std::uint32_t place,
+                                               std::uint32_t row, std::uint32_t mask) {
   const char* base = reinterpret_cast<const char*>(&s);
   const auto word = [base](std::uint32_t at) {
     return *reinterpret_cast<const std::uint32_t*>(base + at);
   };
-  const auto of_x0 = static_cast<std::uint32_t>(sizeof s.places[0]);
-  const EdgePlace place = place_at(8 * edge | (x == 0 ? places + of_x0 : places));
-  const std::uint32_t at = row + place.offset;
-  return word(at + kNumberOfWord) + place.addend +
-         static_cast<std::uint32_t>(__popc(word(at) & low_bits(x)));
+  const EdgePlace edge = place_at(place);
+  const std::uint32_t at = row + edge.offset;
+  return word(at + kNumberOfWord) + edge.addend +
+         static_cast<std::uint32_t>(__popc(word(at) & mask));
 }
 
 /// Writes triangle `number` of a listed cell. `places` is the address of the table.
 __device__ inline void write_triangle(const TileShared& s, std::uint32_t places, std::uint32_t cell,
                                       std::uint32_t number, Triangle& to) {
-  const char* base = reinterpret_cast<const char*>(&s);
-  const auto word = [base](std::uint32_t at) {
-    return *reinterpret_cast<const std::uint32_t*>(base + at);
-  };
   const std::uint32_t x = cell & 31u, row = cell >> 3 & 0x1ffcu, mask = low_bits(x);
   const std::uint32_t edges = s.cases.triangles[5 * __byte_perm(cell, 0, 0x4442) + number];
-  const std::uint32_t of_x =
-      x == 0 ? places + static_cast<std::uint32_t>(sizeof s.places[0]) : places;
+  const std::uint32_t of_x = places_of(s, places, x);
   std::uint32_t corners[3];
 #pragma unroll
-  for (int c = 0; c < 3; ++c) {
-    const EdgePlace place = place_at((edges >> 4 * c & 0x78u) | of_x);
-    const std::uint32_t at = row + place.offset;
-    corners[c] = word(at + kNumberOfWord) + place.addend + __popc(word(at) & mask);
-  }
+  for (int c = 0; c < 3; ++c)
+    corners[c] = number_on_edge(s, (edges >> 4 * c & 0x78u) | of_x, row, mask);
 #pragma unroll
   for (int c = 0; c < 3; ++c) __stcs(&to[static_cast<std::size_t>(c)], corners[c]);
 }
