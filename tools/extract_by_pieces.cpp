@@ -28,6 +28,8 @@ constexpr std::uint64_t kBlocksOfPiece = std::uint64_t{1} << 13;
 constexpr std::uint64_t kMaxPieces = 500;
 /// A device makes a piece in milliseconds, and takes as long to begin one.
 constexpr std::uint64_t kBlocksOfPieceOnDevice = std::uint64_t{1} << 16;
+/// Where devices share a surface and keep no pieces, one that is lost is no reason for many.
+constexpr std::uint64_t kBlocksOfSharedPiece = std::uint64_t{1} << 22;
 
 /// Of one rank, so that no rank waits long for the last piece.
 constexpr std::uint64_t kPiecesOfRank = 4;
@@ -41,13 +43,14 @@ std::uint32_t count_parts(const StoreReader& store, ExtractOptions options, cons
     return std::max<std::uint64_t>(1, (blocks + size - 1) / size);
   };
   const bool on_device = options.backend == Backend::cuda;
-  std::uint64_t parts =
-      std::min(pieces(on_device ? kBlocksOfPieceOnDevice : kBlocksOfPiece), kMaxPieces);
-  if (job != nullptr) {
-    const auto for_all = kPiecesOfRank * static_cast<std::uint64_t>(job->size());
-    parts = std::max(parts, std::min({for_all, pieces(kFewestBlocks), std::uint64_t{kMaxParts}}));
-  }
-  return static_cast<std::uint32_t>(parts);
+  const auto ranks = static_cast<std::uint64_t>(job != nullptr ? job->size() : 0);
+  const std::uint64_t size = !on_device       ? kBlocksOfPiece
+                             : job == nullptr ? kBlocksOfPieceOnDevice
+                                              : kBlocksOfSharedPiece;
+  const std::uint64_t for_ranks = ranks * (on_device ? 1 : kPiecesOfRank);
+  return static_cast<std::uint32_t>(
+      std::max(std::min(pieces(size), kMaxPieces),
+               std::min({for_ranks, pieces(kFewestBlocks), std::uint64_t{kMaxParts}})));
 }
 
 /// What pieces took, as numbers that ranks can add up.
