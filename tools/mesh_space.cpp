@@ -40,7 +40,8 @@ MeshBytes predict_bytes(const MeshForm& form, MeshSize size) {
     }
     case MeshFormat::pvtp: {
       // A few vertices in a hundred belong to several parts.
-      const std::uint64_t file = header + rows + rows / 20 + t * (triangle + 4);
+      const std::uint64_t points = rows + v * sizeof(std::int64_t);  // with global ids
+      const std::uint64_t file = header + points + points / 20 + t * (triangle + 4);
       return {file, file + rows + t * triangle};
     }
     case MeshFormat::neuroglancer: {

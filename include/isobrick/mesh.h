@@ -18,6 +18,8 @@ namespace isobrick::inline v0 {
 
 /// Three vertex numbers, counter-clockwise seen from outside (see Inside).
 using Triangle = std::array<std::uint32_t, 3>;
+/// The same in a mesh of more vertices than 32 bits number.
+using WideTriangle = std::array<std::uint64_t, 3>;
 
 /// sRGB, a byte each; the fourth is not used.
 using VertexColour = std::array<std::uint8_t, 4>;
@@ -48,6 +50,8 @@ struct MeshChunk {
   std::span<const VertexColour> colours = {};  ///< of meshes of others; empty or one a position
   /// Those of MeshHeader::attributes, in that order.
   std::span<const VertexAttribute> attributes = {};
+  /// In place of `triangles` where MeshHeader::wide says so.
+  std::span<const WideTriangle> wide_triangles = {};
 };
 
 struct MeshFileOptions;
@@ -110,6 +114,9 @@ struct MeshHeader {
   /// Names of the vertex attributes that every chunk has. Sinks without a place for them ignore
   /// them, as filters and MemorySink do.
   std::vector<std::string> attributes = {};
+  /// The mesh has more vertices than 32 bits number, and chunks have `wide_triangles`. Only for
+  /// sinks that take them.
+  bool wide = false;
 };
 
 /// Takes a mesh chunk by chunk. Calls come from one thread at a time, in order.
@@ -119,6 +126,8 @@ class ISOBRICK_API MeshSink {
 
   /// How the chunks that it takes name their vertices.
   virtual Indexing indexing() const = 0;
+  /// Whether it takes meshes with MeshHeader::wide, as formats in parts do.
+  virtual bool takes_wide() const { return false; }
   /// Called once, before the first chunk. Throws Error when the file cannot be written.
   virtual void begin(const MeshHeader& header) = 0;
   /// Takes the next chunk, which it copies or writes. Throws Error when the file cannot be written.

@@ -189,12 +189,19 @@ void remove_unfinished() noexcept {
     }
 }
 
+std::string part_name(std::uint64_t number, std::uint32_t cut, std::string_view extension) {
+  return cut == 0 ? fmt::format("part_{}{}", number, extension)
+                  : fmt::format("part_{}_{}{}", number, cut, extension);
+}
+
 bool is_part_name(std::string_view name) {
   constexpr std::string_view prefix = "part_";
-  if (!name.starts_with(prefix)) return false;
   const std::size_t dot = name.find('.');
-  return dot != std::string_view::npos &&
-         is_digits(name.substr(prefix.size(), dot - prefix.size()));
+  if (!name.starts_with(prefix) || dot == std::string_view::npos) return false;
+  const std::string_view numbers = name.substr(prefix.size(), dot - prefix.size());
+  const std::size_t between = numbers.find('_');
+  return is_digits(numbers.substr(0, between)) &&
+         (between == std::string_view::npos || is_digits(numbers.substr(between + 1)));
 }
 
 }  // namespace isobrick

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <string_view>
@@ -46,7 +47,10 @@ class Publication {
 /// and has not published, and lets no publication begin any more.
 void remove_unfinished() noexcept;
 
-/// Whether a file can be a part of an output in several files: part_3.vtp.
+/// Names of parts of an output in several files: part_3.vtp, part_3_1.vtp for what a further cut
+/// made of the third. `extension` with its dot.
+std::string part_name(std::uint64_t number, std::uint32_t cut, std::string_view extension);
+/// Whether a file has such a name.
 bool is_part_name(std::string_view name);
 
 }  // namespace isobrick

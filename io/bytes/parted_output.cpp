@@ -54,6 +54,13 @@ fs::path free_folder(const fs::path& path) {
   return part_folder(path, number);
 }
 
+/// `shown` is for messages.
+File create_file(const fs::path& path, const fs::path& shown) {
+  UniqueFd fd(::open(path.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666));
+  if (fd.get() < 0) throw system_error("create", path.string(), errno);
+  return {std::move(fd), shown};
+}
+
 }  // namespace
 
 PartedOutput::PartedOutput(std::string path, bool force)
@@ -66,28 +73,28 @@ PartedOutput::~PartedOutput() {
   if (!temporary_.path.empty()) fs::remove_all(temporary_.path, ignored);
 }
 
-FileWriter PartedOutput::create_part(std::string_view extension) {
+const std::string& PartedOutput::parts_folder() {
   if (index_.path() == kStandardOutput)
     throw UsageError(
         "the mesh needs several files, which standard output cannot take; name a file, or choose "
         "the format PLY");
   if (temporary_.path.empty())
     temporary_ = create_temporary_folder(part_folder(index_.path(), 1).string());
-  const fs::path path = fs::path(temporary_.path) / fmt::format("part_{}{}", parts_, extension);
-  UniqueFd fd(::open(path.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666));
-  if (fd.get() < 0) throw system_error("create", path.string(), errno);
-  ++parts_;
-  return FileWriter({std::move(fd), folder_ / path.filename()});
+  return temporary_.path;
 }
 
-std::string PartedOutput::reference(std::size_t part, std::string_view extension) const {
-  return fmt::format("{}/part_{}{}", folder_.filename().string(), part, extension);
+FileWriter PartedOutput::create_part(const std::string& name) {
+  return FileWriter(create_file(fs::path(parts_folder()) / name, folder_ / name));
+}
+
+std::string PartedOutput::reference(std::string_view name) const {
+  return fmt::format("{}/{}", folder_.filename().string(), name);
 }
 
 void PartedOutput::publish() {
   if (index_.path() == kStandardOutput) return index_.publish();
   const Publication turn;
-  if (parts_ > 0) {
+  if (!temporary_.path.empty()) {
     if (const int failure = rename_no_replace(temporary_.path, folder_); failure != 0)
       throw system_error("rename the finished folder to", folder_.string(), failure);
     temporary_.path = folder_;  // goes with the file if that cannot be published
@@ -96,6 +103,10 @@ void PartedOutput::publish() {
   temporary_.path.clear();
   std::error_code ignored;  // the output is whole; the next one of its name tries again
   for (const fs::path& folder : earlier_) fs::remove_all(folder, ignored);
+}
+
+FileWriter create_part_file(const fs::path& folder, const std::string& name) {
+  return FileWriter(create_file(folder / name, folder / name));
 }
 
 std::vector<fs::path> part_folders(const fs::path& path) {

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <cstddef>
 #include <filesystem>
 #include <string>
 #include <string_view>
@@ -31,12 +30,14 @@ class PartedOutput {
   OutputFile& index() { return index_; }
   const OutputFile& index() const { return index_; }
 
-  /// Creates the next part; `extension` with its dot. It must be flushed before publish(). Throws
+  /// Creates a part, which is_part_name() is true of. It must be flushed before publish(). Throws
   /// UsageError on standard output, which takes one file.
-  FileWriter create_part(std::string_view extension);
-  std::size_t parts() const { return parts_; }
+  FileWriter create_part(const std::string& name);
+  /// The folder of the parts until publish(), made where there is none yet: for other processes,
+  /// with create_part_file(). Throws as create_part().
+  const std::string& parts_folder();
   /// How the file names a part, relative to its own folder: head.pvtp.parts/part_0.vtp.
-  std::string reference(std::size_t part, std::string_view extension) const;
+  std::string reference(std::string_view name) const;
 
   /// Moves the folder and then the file to their places. Removes the folders of
   /// an earlier output even if this one has no parts.
@@ -47,8 +48,10 @@ class PartedOutput {
   std::filesystem::path folder_;                ///< where the parts will be
   OutputFile index_;
   Temporary temporary_;  ///< the folder while it is written; without a path when there is none
-  std::size_t parts_ = 0;
 };
+
+/// Creates a part in a folder that another process has made by parts_folder(). Throws Error.
+FileWriter create_part_file(const std::filesystem::path& folder, const std::string& name);
 
 /// The folders of parts that are beside `path`.
 std::vector<std::filesystem::path> part_folders(const std::filesystem::path& path);

@@ -7,6 +7,8 @@
 #include <utility>
 #include <vector>
 
+#include "io/bytes/leftovers.h"
+
 namespace isobrick::inline v0 {
 namespace {
 
@@ -51,11 +53,12 @@ void GlbSink::write(const MeshChunk& chunk) {
 GlbPrimitive GlbSink::append_part(FileWriter& out, const MeshPart& part) {
   GlbPrimitive primitive{.vertices = part.vertices(), .triangles = part.triangles};
   primitive.vertex_bytes = part.vertices() * vertices_.row_bytes();
-  for_each_row_run(part, [&](std::span<const std::byte> run) {
-    primitive.bounds.include(vertices_.append(out, run));
+  for_each_row_batch(stored(), part, [&](std::span<const std::byte> rows) {
+    primitive.bounds.include(vertices_.append(out, rows));
   });
-  for_each_triangle_run(part,
-                        [&](std::span<const Triangle> run) { out.append(std::as_bytes(run)); });
+  for_each_triangle_batch(stored(), part, [&](std::span<const Triangle> triangles) {
+    out.append(std::as_bytes(triangles));
+  });
   return primitive;
 }
 
@@ -71,7 +74,7 @@ void GlbSink::finish_whole(const GlbPrimitive& primitive) {
 void GlbSink::finish_parts() {
   std::vector<GlbPrimitive> primitives;
   write_parts(kPartExtension, [&](FileWriter& out, const MeshPart& part) {
-    const std::string uri = output().reference(primitives.size(), kPartExtension);
+    const std::string uri = output().reference(part_name(part.run, part.number, kPartExtension));
     primitives.push_back(append_part(out, part));
     primitives.back().uri = percent_encoded(uri);
   });
@@ -86,7 +89,8 @@ void GlbSink::finish() {
                            .vertex_bytes = size().vertices * vertices_.row_bytes()};
   if (size().triangles == 0)
     output().index().writer().append(glb_start(glb_json(vertices_, {}), 0));
-  else if (kStartBytes + attributes().size() * kAttributeBytes + whole.bytes() <= file_bytes_)
+  else if (!stored().wide &&
+           kStartBytes + attributes().size() * kAttributeBytes + whole.bytes() <= file_bytes_)
     finish_whole(whole);
   else
     finish_parts();

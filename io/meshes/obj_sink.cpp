@@ -16,8 +16,8 @@ namespace {
 constexpr std::size_t kBatch = 2048;
 /// The longest line of a vertex: "-1.17549435e-38" is 15 characters.
 constexpr std::size_t kVertexText = 2 * (3 + 3 * 16) + 2;
-/// The longest line of a face: six numbers of up to 10 digits.
-constexpr std::size_t kFaceText = 2 + 3 * (2 * 10 + 3);
+/// The longest line of a face: six numbers of up to 14 digits.
+constexpr std::size_t kFaceText = 2 + 3 * (2 * 14 + 3);
 constexpr std::size_t kBatchText = kBatch * std::max(kVertexText, kFaceText);
 
 char* put(char* to, std::string_view text) { return std::copy(text.begin(), text.end(), to); }
@@ -37,12 +37,13 @@ char* put_vector(char* to, std::string_view keyword, Vec3f v) {
   return to;
 }
 
-char* put_face(char* to, const Triangle& triangle, bool normals) {
+template <class AnyTriangle>
+char* put_face(char* to, const AnyTriangle& triangle, bool normals) {
   *to++ = 'f';
-  for (const std::uint32_t vertex : triangle) {
+  for (const std::uint64_t vertex : triangle) {
     *to++ = ' ';
     char* const number = to;
-    to = put_number(to, std::uint64_t{vertex} + 1);
+    to = put_number(to, vertex + 1);
     if (!normals) continue;
     const std::size_t digits = static_cast<std::size_t>(to - number);
     to = put(to, "//");
@@ -100,9 +101,12 @@ void ObjSink::write(const MeshChunk& chunk) {
     to = put_vector(to, "v", chunk.positions[i]);
     return normals ? put_vector(to, "vn", chunk.normals[i]) : to;
   });
-  append_text(faces_, arena_, chunk.triangles.size(), [&](char* to, std::size_t i) {
-    return put_face(to, chunk.triangles[i], has_normals_);
-  });
+  const auto append_faces = [&](auto triangles) {
+    append_text(faces_, arena_, triangles.size(),
+                [&](char* to, std::size_t i) { return put_face(to, triangles[i], has_normals_); });
+  };
+  append_faces(chunk.triangles);
+  append_faces(chunk.wide_triangles);
 }
 
 void ObjSink::finish() {

@@ -20,6 +20,7 @@ class ObjSink final : public MeshSink {
   ObjSink(std::string path, bool force, int threads = 0);
 
   Indexing indexing() const override { return Indexing::welded; }
+  bool takes_wide() const override { return true; }
   void begin(const MeshHeader& header) override;
   void write(const MeshChunk& chunk) override;
   void finish() override;

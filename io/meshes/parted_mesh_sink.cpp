@@ -10,13 +10,36 @@ PartedMeshSink::PartedMeshSink(std::string path, bool force, std::uint64_t part_
     : out_(std::move(path), force),
       rows_(open_scratch_beside(out_.index().path())),
       triangles_(open_scratch_beside(out_.index().path())),
-      part_triangles_(part_triangles) {}
+      part_triangles_(part_triangles),
+      runs_(part_triangles) {
+  stored_.rows = [this](std::uint64_t offset, std::span<std::byte> bytes) {
+    rows_.read_back(offset, bytes);
+  };
+  stored_.triangles = [this](std::uint64_t offset, std::span<std::byte> bytes) {
+    triangles_.read_back(offset, bytes);
+  };
+}
+
+void PartedMeshSink::begin(const MeshHeader& header) {
+  has_normals_ = header.has_normals;
+  unit_ = header.unit;
+  attributes_ = header.attributes;
+  stored_.row_bytes = row_bytes(has_normals_, attributes_.size());
+  stored_.wide = header.wide;
+}
 
 void PartedMeshSink::write(const MeshChunk& chunk) {
-  size_.vertices += chunk.positions.size();
-  size_.triangles += chunk.triangles.size();
   append_rows(rows_, chunk);
-  triangles_.append(std::as_bytes(chunk.triangles));
+  size_.vertices += chunk.positions.size();
+  const auto add = [&](auto triangles) {
+    runs_.add(size_.triangles, triangles);
+    triangles_.append(std::as_bytes(triangles));
+    size_.triangles += triangles.size();
+  };
+  if (stored_.wide)
+    add(chunk.wide_triangles);
+  else
+    add(chunk.triangles);
 }
 
 std::uint64_t PartedMeshSink::bytes() const {
@@ -26,27 +49,19 @@ std::uint64_t PartedMeshSink::bytes() const {
 void PartedMeshSink::write_parts(
     std::string_view extension,
     const std::function<void(FileWriter&, const MeshPart&)>& write_part) {
-  for_each_part(triangles_, size_, part_triangles_, [&](const MeshPart& part) {
-    FileWriter out = out_.create_part(extension);
-    write_part(out, part);
-    out.finish();
-    part_bytes_ += out.size();
-  });
+  const std::vector<MeshRun> runs = runs_.runs(size_);
+  for (std::size_t i = 0; i < runs.size(); ++i)
+    for_each_part(stored_, i, runs[i], part_triangles_, [&](const MeshPart& part) {
+      FileWriter out = out_.create_part(part_name(part.run, part.number, extension));
+      write_part(out, part);
+      out.finish();
+      part_bytes_ += out.size();
+    });
 }
 
 void PartedMeshSink::append_whole(FileWriter& out) {
   out.append_file(rows_);
   out.append_file(triangles_);
-}
-
-void PartedMeshSink::for_each_row_run(const MeshPart& part,
-                                      const std::function<void(std::span<const std::byte>)>& take) {
-  isobrick::for_each_row_run({rows_, row_bytes(has_normals_, attributes_.size())}, part, take);
-}
-
-void PartedMeshSink::for_each_triangle_run(
-    const MeshPart& part, const std::function<void(std::span<const Triangle>)>& take) {
-  isobrick::for_each_triangle_run(triangles_, part, take);
 }
 
 }  // namespace isobrick

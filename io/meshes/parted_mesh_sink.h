@@ -21,11 +21,8 @@ class PartedMeshSink : public MeshSink {
   static constexpr std::uint64_t kPartTriangles = std::uint64_t{1} << 20;
 
   Indexing indexing() const override { return Indexing::welded; }
-  void begin(const MeshHeader& header) override {
-    has_normals_ = header.has_normals;
-    unit_ = header.unit;
-    attributes_ = header.attributes;
-  }
+  bool takes_wide() const override { return true; }
+  void begin(const MeshHeader& header) override;
   void write(const MeshChunk& chunk) override;
   std::uint64_t bytes() const override;
   std::uint64_t memory() const override { return part_memory(part_triangles_); }
@@ -42,18 +39,14 @@ class PartedMeshSink : public MeshSink {
   MeshSize size() const { return size_; }
   PartedOutput& output() { return out_; }
   const PartedOutput& output() const { return out_; }
+  /// What was written so far, to be read while the sink lives and its scratch files do.
+  const StoredMesh& stored() const { return stored_; }
 
   /// Creates a file for each part of the mesh, in order, and calls write_part(file, part).
   void write_parts(std::string_view extension,
                    const std::function<void(FileWriter&, const MeshPart&)>& write_part);
   /// Appends the whole mesh: rows as append_rows() writes them, then triangles of UInt32.
   void append_whole(FileWriter& out);
-  /// Calls take(bytes) for runs of a part's rows; see mesh_parts.h.
-  void for_each_row_run(const MeshPart& part,
-                        const std::function<void(std::span<const std::byte>)>& take);
-  /// Calls take(triangles) for runs of a part's triangles; see mesh_parts.h.
-  void for_each_triangle_run(const MeshPart& part,
-                             const std::function<void(std::span<const Triangle>)>& take);
 
   /// Frees what scratch files take of the memory. They are not needed any more.
   void release_scratch() {
@@ -64,7 +57,9 @@ class PartedMeshSink : public MeshSink {
  private:
   PartedOutput out_;
   FileWriter rows_, triangles_;  ///< scratch files of the whole mesh
+  StoredMesh stored_;            ///< what is in them
   std::uint64_t part_triangles_, part_bytes_ = 0;
+  RunFinder runs_;
   MeshSize size_;
   bool has_normals_ = false;
   std::string unit_;

@@ -57,7 +57,7 @@ void append_numbers(FileWriter& out, bool wide, std::uint64_t count, const F& nu
 
 bool VtpLayout::wide() const {
   constexpr std::uint64_t most = std::numeric_limits<std::int32_t>::max();
-  return size.vertices > most || size.triangles > most / 3;
+  return has_wide_numbers || size.vertices > most || size.triangles > most / 3;
 }
 
 std::uint64_t VtpLayout::connectivity_bytes() const {
@@ -70,15 +70,20 @@ std::string VtpLayout::header() const {
   constexpr std::uint64_t length = sizeof(std::uint64_t);
   const std::string_view number = wide() ? "Int64" : "Int32";
   std::uint64_t offset = length + point_bytes();
-  std::string point_data = "      <PointData>\n";
+  std::string active, arrays;
   if (normals) {
-    point_data =
-        "      <PointData Normals=\"Normals\">\n" + data_array("Float32", "Normals", 3, offset);
+    active += " Normals=\"Normals\"";
+    arrays += data_array("Float32", "Normals", 3, offset);
     offset += length + point_bytes();
   }
   for (const std::string& name : attributes) {
-    point_data += data_array("Float32", name, 1, offset);
+    arrays += data_array("Float32", name, 1, offset);
     offset += length + attribute_bytes();
+  }
+  if (global_ids) {
+    active += fmt::format(" GlobalIds=\"{}\"", kGlobalIds);
+    arrays += data_array("Int64\" IdType=\"1", kGlobalIds, 1, offset);
+    offset += length + global_id_bytes();
   }
   std::string text = fmt::format(
       "<?xml version=\"1.0\"?>\n"
@@ -86,14 +91,15 @@ std::string VtpLayout::header() const {
       "header_type=\"UInt64\">\n"
       "  <PolyData>\n{}"
       "    <Piece NumberOfPoints=\"{}\" NumberOfVerts=\"0\" NumberOfLines=\"0\" "
-      "NumberOfStrips=\"0\" NumberOfPolys=\"{}\">\n{}      </PointData>\n"
+      "NumberOfStrips=\"0\" NumberOfPolys=\"{}\">\n"
+      "      <PointData{}>\n{}      </PointData>\n"
       "      <Points>\n{}      </Points>\n      <Polys>\n{}{}      </Polys>\n"
       "    </Piece>\n  </PolyData>\n",
-      unit_field(unit), size.vertices, size.triangles, point_data,
+      unit_field(unit), size.vertices, size.triangles, active, arrays,
       data_array("Float32", "Points", 3, 0), data_array(number, "connectivity", 1, offset),
       data_array(number, "offsets", 1, offset + length + connectivity_bytes()));
   constexpr std::string_view data = "\n  <AppendedData encoding=\"raw\">\n   _";
-  std::size_t bytes = kHeaderBytes;
+  std::size_t bytes = kHeaderBytes + (global_ids ? 2 * kAttributeBytes : 0);
   for (const std::string& name : attributes) bytes += kAttributeBytes + name.size();
   text.resize(bytes - data.size(), ' ');
   return text.append(data);

@@ -20,6 +20,7 @@ class VtpSink final : public MeshSink {
   VtpSink(std::string path, bool force, std::size_t memory = 0);
 
   Indexing indexing() const override { return Indexing::welded; }
+  bool takes_wide() const override { return true; }
   void begin(const MeshHeader& header) override;
   void write(const MeshChunk& chunk) override;
   void finish() override;
@@ -27,6 +28,8 @@ class VtpSink final : public MeshSink {
   std::uint64_t memory() const override { return memory_; }
 
  private:
+  void append_widened(FileWriter& out);
+
   std::size_t memory_;
   OutputFile out_;                      ///< header and points; the rest at the end
   FileWriter normals_, triangles_;      ///< wait until all points are written
@@ -36,19 +39,13 @@ class VtpSink final : public MeshSink {
 
 /// Writes a welded mesh as VTK partitioned PolyData (.pvtp): an index and, in
 /// the folder `path`.parts, one .vtp for each run of `part_triangles`. Vertices
-/// that several parts name are repeated in each.
+/// that several parts name are repeated in each; global ids tell that they are the same.
 class PvtpSink final : public PartedMeshSink {
  public:
-  /// See PartedOutput for what `path` and `force` may throw. UsageError also for
-  /// a name that XML cannot hold, not UTF-8 or with control characters, and for standard output.
+  /// See PartedOutput for what `path` and `force` may throw, and check_pvtp_name().
   PvtpSink(std::string path, bool force, std::uint64_t part_triangles = kPartTriangles);
 
   void finish() override;
-
- private:
-  void write_part(FileWriter& out, const MeshPart& part);
-  std::string point_data_text() const;
-  std::string index_text() const;
 };
 
 }  // namespace isobrick

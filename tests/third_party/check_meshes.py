@@ -81,6 +81,16 @@ def unit_of(data):
     return strings.GetValue(0) if strings else None
 
 
+def check_global_ids(name, pvtp, whole):
+    ids = pvtp.GetPointData().GetGlobalIds()
+    if not len(whole.points):
+        return
+    check(ids is not None, f"{name}.pvtp: no global ids")
+    ids = vtk_to_numpy(ids)
+    check(same(Mesh(pvtp).points, whole.points[ids]), f"{name}.pvtp: points of global ids")
+    check(len(numpy.unique(ids)) == len(whole.points), f"{name}.pvtp: number of global ids")
+
+
 def compare(base):
     name = base.name
     vtp = read(base.with_name(name + ".vtp"), vtk.vtkXMLPolyDataReader())
@@ -103,7 +113,9 @@ def compare(base):
             near = numpy.abs(mesh.normals - reference.normals).max() < 2e-7
             equal = near if kind == "glb" else same(mesh.normals, reference.normals)
             check(equal, f"{name}.{kind}: normals")
-    parts = Mesh(read(base.with_name(name + ".pvtp"), vtk.vtkXMLPPolyDataReader()))
+    pvtp = read(base.with_name(name + ".pvtp"), vtk.vtkXMLPPolyDataReader())
+    parts = Mesh(pvtp)
+    check_global_ids(name, pvtp, reference)
     check(same(parts.soup(), reference.soup()), f"{name}.pvtp: triangles")
     check(parts.bounds == reference.bounds, f"{name}.pvtp: bounds")
     if reference.normals is not None and len(reference.points):

@@ -19,7 +19,7 @@ using Names = std::vector<std::string>;
 
 void write_parts(PartedOutput& out, int parts, const std::string& text) {
   for (int i = 0; i < parts; ++i) {
-    FileWriter part = out.create_part(".x");
+    FileWriter part = out.create_part(part_name(static_cast<unsigned>(i), 0, ".x"));
     part.append(text + std::to_string(i));
     part.flush();
   }
@@ -32,7 +32,7 @@ TEST(PartedOutput, AppearsOnlyWhenPublished) {
     PartedOutput out(dir / "a", false);
     write_parts(out, 2, "p");
     for (const std::string& name : dir.list()) EXPECT_TRUE(contains(name, ".partial-")) << name;
-    EXPECT_EQ(out.reference(1, ".x"), "a.parts/part_1.x");
+    EXPECT_EQ(out.reference("part_1.x"), "a.parts/part_1.x");
     out.publish();
   }
   EXPECT_EQ(dir.list(), (Names{"a", "a.parts"}));
@@ -72,7 +72,8 @@ TEST(PartedOutput, KeepsWhatIsNotItsOwn) {
   const TempDir dir;
   fs::create_directory(dir / "a.parts");
   EXPECT_TRUE(contains(message_of([&] { PartedOutput(dir / "a", false); }), "exists"));
-  for (const char* name : {"notes.txt", "part_.x", "part_1x", "part_1"}) {
+  for (const char* name :
+       {"notes.txt", "part_.x", "part_1x", "part_1", "part_1_.x", "part__1.x", "part_1_2_3.x"}) {
     dir.write(std::string("a.parts/") + name, "mine");
     EXPECT_TRUE(contains(message_of([&] { PartedOutput(dir / "a", true); }), name));
     fs::remove(dir / (std::string("a.parts/") + name));

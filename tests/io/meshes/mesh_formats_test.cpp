@@ -6,11 +6,11 @@
 #include <memory>
 
 #include "io/meshes/glb_sink.h"
-#include "io/meshes/mesh_parts.h"
 #include "io/meshes/obj_sink.h"
 #include "io/meshes/ply_sink.h"
 #include "io/meshes/vtp_layout.h"
 #include "io/meshes/vtp_sink.h"
+#include "mesh_chunks.h"
 #include "mesh_reader.h"
 
 // Every format against the same mesh as PLY has it.
@@ -18,52 +18,6 @@ namespace isobrick::inline v0 {
 namespace {
 
 namespace fs = std::filesystem;
-
-/// A mesh in chunks; triangles of a chunk may name vertices of those before.
-struct Chunks {
-  TestMesh mesh;
-  std::vector<std::pair<std::size_t, std::size_t>> ends;  ///< vertices, triangles
-};
-
-/// A ball far from the origin, in pieces of about `triangles`.
-Chunks make_chunks(std::size_t triangles, std::uint32_t rings = 40) {
-  Chunks chunks{make_ball({1000.125f, -2, 3e-3f}, 7, rings), {}};
-  std::size_t vertices = 0;
-  for (std::size_t t = 0; t < chunks.mesh.triangles.size();) {
-    const std::size_t end = std::min(t + triangles, chunks.mesh.triangles.size());
-    for (; t < end; ++t)
-      for (const std::uint32_t v : chunks.mesh.triangles[t])
-        vertices = std::max(vertices, std::size_t{v} + 1);
-    if (end == chunks.mesh.triangles.size()) vertices = chunks.mesh.positions.size();
-    chunks.ends.emplace_back(vertices, end);
-  }
-  return chunks;
-}
-
-/// The same with all vertices before the triangles.
-Chunks vertices_first(Chunks chunks) {
-  const std::size_t vertices = chunks.mesh.positions.size(),
-                    triangles = chunks.mesh.triangles.size();
-  chunks.ends = {
-      {vertices / 3, 0}, {vertices, 0}, {vertices, triangles / 2}, {vertices, triangles}};
-  return chunks;
-}
-
-void write(MeshSink& sink, const Chunks& chunks, bool normals, const std::string& unit = "") {
-  EXPECT_EQ(sink.indexing(), Indexing::welded);
-  sink.begin({normals, {0, 0, 0}, {1, 1, 1}, {}, unit});
-  std::size_t v = 0, t = 0;
-  for (const auto& [v_end, t_end] : chunks.ends) {
-    MeshChunk chunk{.first_vertex = v};
-    chunk.positions = std::span(chunks.mesh.positions).subspan(v, v_end - v);
-    if (normals) chunk.normals = std::span(chunks.mesh.normals).subspan(v, v_end - v);
-    chunk.triangles = std::span(chunks.mesh.triangles).subspan(t, t_end - t);
-    sink.write(chunk);
-    v = v_end;
-    t = t_end;
-  }
-  sink.finish();
-}
 
 /// What PLY has, read by the test's reader.
 TestMesh as_ply(const TempDir& dir, const Chunks& chunks, bool normals) {
@@ -331,6 +285,8 @@ TEST(VtpLayout, NumbersGrowOnlyWhereTheyMust) {
   with_unit.unit = "femtometer";  // no name is longer
   EXPECT_EQ(with_unit.header().size(), VtpLayout{}.header().size());
   EXPECT_TRUE(contains(with_unit.header(), "</PolyData>"));
+  with_unit.global_ids = true;
+  EXPECT_TRUE(contains(with_unit.header(), "</PolyData>"));
 }
 
 TEST(VtpLayout, WideNumbersAreInt64) {
@@ -345,26 +301,6 @@ TEST(VtpLayout, WideNumbersAreInt64) {
   const std::int64_t expected[] = {0, 1, 4294967294, 7, 8, 9, 16, 3, 6};
   EXPECT_EQ(bytes.substr(0, sizeof(expected)),
             std::string(reinterpret_cast<const char*>(expected), sizeof(expected)));
-}
-
-TEST(MeshParts, EveryVertexIsOwnedOnce) {
-  const TempDir dir;
-  const Chunks chunks = make_chunks(1 << 30, 20);
-  FileWriter triangles = open_scratch_beside(dir / "t");
-  triangles.append(std::as_bytes(std::span(chunks.mesh.triangles)));
-  const MeshSize size{chunks.mesh.positions.size() + 5, chunks.mesh.triangles.size()};
-  std::uint64_t vertex = 0, triangle = 0;
-  for_each_part(triangles, size, 333, [&](const MeshPart& part) {
-    EXPECT_EQ(part.first_triangle, triangle);
-    EXPECT_EQ(part.first_vertex, vertex);
-    EXPECT_LE(part.triangles, 333u);
-    vertex += part.own_vertices;
-    triangle += part.triangles;
-    EXPECT_TRUE(std::is_sorted(part.borrowed.begin(), part.borrowed.end()));
-    for (const std::uint32_t v : part.borrowed) EXPECT_LT(v, part.first_vertex);
-  });
-  EXPECT_EQ(vertex, size.vertices);
-  EXPECT_EQ(triangle, size.triangles);
 }
 
 }  // namespace

@@ -66,7 +66,7 @@ std::map<std::string, VtpArray> vtp_arrays(const std::string& bytes, std::size_t
   std::map<std::string, VtpArray> arrays;
   const std::string xml = bytes.substr(0, data);
   const std::regex pattern(
-      "<DataArray type=\"(\\w+)\" Name=\"(\\w+)\" NumberOfComponents=\"\\d\" "
+      "<DataArray type=\"(\\w+)\"(?: IdType=\"1\")? Name=\"(\\w+)\" NumberOfComponents=\"\\d\" "
       "format=\"appended\" offset=\"(\\d+)\"/>");
   for (std::sregex_iterator it(xml.begin(), xml.end(), pattern), end; it != end; ++it) {
     const std::size_t at = data + std::stoull((*it)[3]);
@@ -248,7 +248,13 @@ PvtpFile read_pvtp(const std::string& text, const std::string& folder) {
   PvtpFile file;
   const std::regex pattern("<Piece Source=\"([^\"]+)\"/>");
   for (std::sregex_iterator it(text.begin(), text.end(), pattern), end; it != end; ++it) {
-    append(file.mesh, read_vtp(read_bytes(folder + "/" + xml_unescaped((*it)[1]))));
+    const std::string bytes = read_bytes(folder + "/" + xml_unescaped((*it)[1]));
+    append(file.mesh, read_vtp(bytes));
+    EXPECT_TRUE(contains(bytes, " GlobalIds=\"GlobalPointIds\">"));
+    const std::string start = "<AppendedData encoding=\"raw\">\n   _";
+    const auto arrays = vtp_arrays(bytes, bytes.find(start) + start.size());
+    const auto ids = whole_numbers(bytes, arrays.at("GlobalPointIds"));
+    file.ids.insert(file.ids.end(), ids.begin(), ids.end());
     ++file.parts;
   }
   return file;

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <cstdint>
 #include <string>
+#include <vector>
 
 #include "test_meshes.h"
 #include "tests/io/bytes/temp_dir.h"
@@ -27,6 +29,7 @@ GlbFile read_glb(const std::string& bytes, const std::string& uri_folder);
 /// The file's parts joined, and how many there are.
 struct PvtpFile {
   TestMesh mesh;
+  std::vector<std::uint64_t> ids;  ///< global ids of all points
   std::size_t parts = 0;
 };
 PvtpFile read_pvtp(const std::string& text, const std::string& folder);
