@@ -26,6 +26,7 @@ class FilterStage : public MeshSink {
   virtual std::uint64_t own_memory() const = 0;
 
   MeshSink& next() { return next_; }
+  const MeshSink& next() const { return next_; }
   /// Throws Cancelled when an end was requested. To be called for every few thousand elements.
   void check_cancelled() const {
     if (cancel_requested() || cancel_.stop_requested())

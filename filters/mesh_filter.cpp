@@ -34,11 +34,12 @@ class CountStage final : public FilterStage {
       : FilterStage(next, std::move(cancel)), indexing_(indexing) {}
 
   Indexing indexing() const override { return indexing_; }
+  bool takes_wide() const override { return next().takes_wide(); }
   void begin(const MeshHeader& header) override { next().begin(header); }
   void write(const MeshChunk& chunk) override {
     check_cancelled();
     size_.vertices += chunk.positions.size();
-    size_.triangles += chunk.triangles.size();
+    size_.triangles += chunk.triangles.size() + chunk.wide_triangles.size();
     next().write(chunk);
   }
   void finish() override { next().finish(); }
@@ -174,6 +175,7 @@ MeshFilter::MeshFilter(MeshSink& sink, const MeshFilterOptions& options)
 MeshFilter::~MeshFilter() = default;
 
 Indexing MeshFilter::indexing() const { return stages_->first().indexing(); }
+bool MeshFilter::takes_wide() const { return stages_->first().takes_wide(); }
 void MeshFilter::begin(const MeshHeader& header) {
   MeshHeader plain = header;
   plain.attributes.clear();

@@ -16,6 +16,7 @@ class UnitStage final : public FilterStage {
       : FilterStage(next, std::move(cancel)), indexing_(next.indexing()), unit_(std::move(unit)) {}
 
   Indexing indexing() const override { return indexing_; }
+  bool takes_wide() const override { return next().takes_wide(); }
   /// Throws UsageError where the mesh has no unit.
   void begin(const MeshHeader& header) override;
   void write(const MeshChunk& chunk) override;

@@ -127,8 +127,7 @@ PiecePlaces find_places(Ranks& ranks, const PartPlans& parts, std::span<const Ow
       const OpenTile& tile = tiles[part.rank].at(taken[part.rank]++);
       if (tile.vertices != neighbour.vertices)
         PieceReader(pieces[i].bytes).fail("does not fit the pieces before it");
-      place.numbers.add(tile.vertices,
-                        static_cast<std::uint32_t>(part.before.vertices + tile.first));
+      place.numbers.add(tile.vertices, part.before.vertices + tile.first);
     }
   }
   return result;

@@ -77,6 +77,7 @@ class ISOBRICK_API AttributeSink final : public MeshSink {
   ~AttributeSink() override;
 
   Indexing indexing() const override;
+  bool takes_wide() const override;
   void begin(const MeshHeader& header) override;
   void write(const MeshChunk& chunk) override;
   void finish() override;

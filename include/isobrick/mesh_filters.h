@@ -108,6 +108,8 @@ class ISOBRICK_API MeshFilter final : public MeshSink {
 
   /// Welded, but that of the sink where there is nothing to do and `takes_welded` is not set.
   Indexing indexing() const override;
+  /// What the sink says, where no filter changes or measures the mesh.
+  bool takes_wide() const override;
   void begin(const MeshHeader& header) override;
   /// Throws Error for a mesh of more than 2³² − 1 vertices.
   void write(const MeshChunk& chunk) override;

@@ -1,7 +1,7 @@
 #include <isobrick/pieces.h>
 
 #include <algorithm>
-#include <limits>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -9,6 +9,7 @@
 
 #include <isobrick/error.h>
 #include "core/cancellable_progress.h"
+#include "pipeline/pieces/merge_limit.h"
 #include "pipeline/pieces/open_tiles.h"
 #include "pipeline/pieces/piece_reader.h"
 #include "pipeline/program_memory.h"
@@ -137,13 +138,17 @@ PieceSet collect(std::span<const fs::path> paths) {
 /// Puts the pieces together, one after the other.
 class Merger {
  public:
-  Merger(const PieceSet& set, MeshSink& sink, bool normals, std::uint64_t chunk_bytes)
+  /// `header` is what the sink was told.
+  Merger(const PieceSet& set, MeshSink& sink, const MeshHeader& header, std::uint64_t chunk_bytes)
       : set_(set),
         piece_normals_(set.first.of_mesh.has_normals),
-        normals_(normals),
+        normals_(header.has_normals),
+        wide_(header.wide),
         chunk_bytes_(chunk_bytes),
         open_(set.first.extent()),
-        writer_(sink) {}
+        sink_(sink) {
+    if (!wide_) writer_.emplace(sink);
+  }
 
   void append(std::size_t number, Progress& progress) {
     PieceReader reader(set_.paths[number]);
@@ -154,7 +159,7 @@ class Merger {
     std::uint64_t reported = 0;
     for (PieceTile tile; reader.next(tile);) {
       const std::uint64_t bytes = content_bytes(tile, piece_normals_);
-      if (chunk_size() > 0 && chunk_size() + bytes > chunk_bytes_) hand_on();
+      if (chunk_size() > 0 && chunk_size() + (wide_ ? 2 : 1) * bytes > chunk_bytes_) hand_on();
       append_tile(tile, reader);
       progress.advance(bytes);
       reported += bytes;
@@ -164,56 +169,82 @@ class Merger {
 
   void finish() {
     hand_on();
-    writer_.finish();
+    if (writer_) writer_->finish();
   }
 
  private:
   std::uint64_t chunk_size() const {
-    return mesh_bytes({chunk_.positions.size(), chunk_.triangles.size()}, piece_normals_);
+    return mesh_bytes({chunk_.positions.size(), chunk_.triangles.size()}, piece_normals_) +
+           wide_triangles_.size() * sizeof(WideTriangle);
   }
 
   void append_tile(const PieceTile& tile, PieceReader& reader) {
-    const std::size_t v = chunk_.positions.size(), t = chunk_.triangles.size();
+    const std::size_t v = chunk_.positions.size();
     chunk_.positions.resize(v + tile.vertices);
     reader.read(std::span(chunk_.positions.data() + v, tile.vertices));
     if (piece_normals_) {
       chunk_.normals.resize(v + tile.vertices);
       reader.read(std::span(chunk_.normals.data() + v, tile.vertices));
     }
+    open_.add(tile, vertices_);
+    vertices_ += tile.vertices;
+    if (!(wide_ ? append_wide(tile, reader) : append_narrow(tile, reader)))
+      reader.fail("is damaged: a triangle names a vertex that is not there");
+  }
+
+  bool append_narrow(const PieceTile& tile, PieceReader& reader) {
+    const std::size_t t = chunk_.triangles.size();
     chunk_.triangles.resize(t + tile.triangles);
     const std::span<Triangle> triangles(chunk_.triangles.data() + t, tile.triangles);
     reader.read(triangles);
-    open_.add(tile, vertices_);
-    vertices_ += tile.vertices;
-    if (!open_.numbers().renumber(triangles, first_vertex_, vertices_ - first_vertex_))
-      reader.fail("is damaged: a triangle names a vertex that is not there");
+    return open_.numbers().renumber(triangles, first_vertex_, vertices_ - first_vertex_);
+  }
+
+  bool append_wide(const PieceTile& tile, PieceReader& reader) {
+    of_tile_.resize(tile.triangles);
+    reader.read(std::span(of_tile_.data(), of_tile_.size()));
+    const std::size_t t = wide_triangles_.size();
+    wide_triangles_.resize(t + tile.triangles);
+    return open_.numbers().renumber(of_tile_.span(), first_vertex_, vertices_ - first_vertex_,
+                                    {wide_triangles_.data() + t, tile.triangles});
   }
 
   void hand_on() {
     if (chunk_size() == 0) return;
     if (!normals_) chunk_.normals.clear();
-    writer_.write(chunk_, vertices_ - chunk_.positions.size());
+    const std::uint64_t first = vertices_ - chunk_.positions.size();
+    if (writer_) return writer_->write(chunk_, first);
+    MeshChunk chunk = chunk_.chunk(first);
+    chunk.wide_triangles = wide_triangles_.span();
+    sink_.write(chunk);
+    chunk_.clear();
+    wide_triangles_.clear();
   }
 
   const PieceSet& set_;
-  bool piece_normals_, normals_;
+  bool piece_normals_, normals_, wide_;
   std::uint64_t chunk_bytes_;
   OpenTiles open_;
   Mesh chunk_;
+  PodBuffer<Triangle> of_tile_;                    ///< with the numbers of its piece
+  PodBuffer<WideTriangle> wide_triangles_;         ///< of the chunk
   std::uint64_t vertices_ = 0, first_vertex_ = 0;  ///< so far, and of the pieces before
-  ChunkWriter writer_;
+  MeshSink& sink_;
+  std::optional<ChunkWriter> writer_;  ///< of numbers of 32 bits
 };
 
-std::uint64_t plan_chunk(const PieceSet& set, std::uint64_t sink_bytes,
+/// Bytes of a chunk. With numbers of 64 bits there is one chunk at a time, twice as large, and a
+/// tile beside it.
+std::uint64_t plan_chunk(const PieceSet& set, bool wide, std::uint64_t sink_bytes,
                          const MergeOptions& options) {
-  const std::uint64_t least = set.info.merge_memory + sink_bytes;
+  const std::uint64_t least = set.info.merge_memory + sink_bytes + (wide ? set.largest_tile : 0);
   if (options.memory < least)
     throw UsageError(fmt::format(
         "a memory budget of {:.1f} MiB is too small: at least --memory {}M is needed, {:.1f} MiB "
         "of it for the program and its libraries and {:.1f} for the output",
         in_mib(options.memory), mib_above(least), in_mib(kProgramBytes), in_mib(sink_bytes)));
   const std::uint64_t spare = (options.memory - least) / 2;
-  return set.largest_tile + std::min(spare, kMergeChunk);
+  return (wide ? 2 : 1) * set.largest_tile + std::min(spare, kMergeChunk);
 }
 
 }  // namespace
@@ -222,20 +253,28 @@ PiecesInfo read_pieces(std::span<const fs::path> pieces) { return collect(pieces
 
 PiecesInfo merge_pieces(std::span<const fs::path> pieces, MeshSink& sink,
                         const MergeOptions& options, Progress& progress) {
+  return merge_pieces_within(kMaxNarrowVertices, pieces, sink, options, progress);
+}
+
+PiecesInfo merge_pieces_within(std::uint64_t max_narrow_vertices, std::span<const fs::path> pieces,
+                               MeshSink& sink, const MergeOptions& options, Progress& progress) {
   if (sink.indexing() != Indexing::welded)
     throw UsageError("pieces make a welded mesh: put a MeshFilter before a sink of another");
   PieceSet set = collect(pieces);
-  if (set.info.size.vertices > std::numeric_limits<std::uint32_t>::max())
-    throw Error(
-        "the mesh has more than 4294967295 vertices, which an indexed mesh of 32 bits cannot "
-        "number; extract regions (--roi) or a coarser --level");
-  const std::uint64_t chunk_bytes = plan_chunk(set, sink.memory(), options);
+  MeshHeader& header = set.info.header;
+  header.has_normals = header.has_normals && options.normals;
+  header.wide = set.info.size.vertices > max_narrow_vertices;
+  if (header.wide && !sink.takes_wide())
+    throw Error(fmt::format(
+        "the mesh has more than {} vertices, which this output cannot number: choose PVTP, VTP, "
+        "OBJ or GLB without filters, regions (--roi) or a coarser --level",
+        max_narrow_vertices));
+  const std::uint64_t chunk_bytes = plan_chunk(set, header.wide, sink.memory(), options);
   CancellableProgress cancellable(progress, options.cancel);
-  set.info.header.has_normals = set.info.header.has_normals && options.normals;
   cancellable.begin("merging", set.info.bytes);
-  sink.begin(set.info.header);
+  sink.begin(header);
   {
-    Merger merger(set, sink, set.info.header.has_normals, chunk_bytes);
+    Merger merger(set, sink, header, chunk_bytes);
     for (std::size_t i = 0; i < set.paths.size(); ++i) merger.append(i, cancellable);
     merger.finish();
   }

@@ -38,7 +38,7 @@ void OpenTiles::begin_piece(const TileRange& tiles, const std::vector<PieceTile>
 
 void OpenTiles::add(const PieceTile& tile, std::uint64_t first) {
   if (tile.vertices > 0 && last_asker(tile.code, grid_) >= end_)
-    open_[tile.code] = {static_cast<std::uint32_t>(first), tile.vertices};
+    open_[tile.code] = {first, tile.vertices};
 }
 
 }  // namespace isobrick

@@ -35,7 +35,8 @@ class OpenTiles {
 
  private:
   struct Open {
-    std::uint32_t first, vertices;
+    std::uint64_t first;
+    std::uint32_t vertices;
   };
 
   Int3 grid_;

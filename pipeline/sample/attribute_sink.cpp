@@ -92,6 +92,8 @@ AttributeSink::~AttributeSink() = default;
 
 Indexing AttributeSink::indexing() const { return impl_->sink.indexing(); }
 
+bool AttributeSink::takes_wide() const { return impl_->sink.takes_wide(); }
+
 void AttributeSink::begin(const MeshHeader& header) {
   Impl& impl = *impl_;
   impl.make_samplers(header.unit);

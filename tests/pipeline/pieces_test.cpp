@@ -13,6 +13,7 @@
 #include <isobrick/error.h>
 #include <isobrick/index_build.h>
 #include <isobrick/mesh_sinks.h>
+#include "pipeline/pieces/merge_limit.h"
 #include "tests/pipeline/least_budget.h"
 #include "tests/pipeline/pieces_fixture.h"
 
@@ -60,6 +61,51 @@ TEST_F(Pieces, BecomeTheMeshOfASingleExtraction) {
       }
     }
   }
+}
+
+/// Takes numbers of 64 bits, and keeps them as they come.
+class WideSink final : public MeshSink {
+ public:
+  Indexing indexing() const override { return Indexing::welded; }
+  bool takes_wide() const override { return true; }
+  void begin(const MeshHeader& header) override { EXPECT_TRUE(header.wide); }
+  void write(const MeshChunk& chunk) override {
+    EXPECT_EQ(chunk.first_vertex, mesh.positions.size());
+    EXPECT_TRUE(chunk.triangles.empty());
+    mesh.positions.insert(mesh.positions.end(), chunk.positions.begin(), chunk.positions.end());
+    mesh.normals.insert(mesh.normals.end(), chunk.normals.begin(), chunk.normals.end());
+    for (const WideTriangle& t : chunk.wide_triangles) {
+      mesh.triangles.emplace_back();
+      for (std::size_t i = 0; i < 3; ++i)
+        mesh.triangles.back()[i] = static_cast<std::uint32_t>(t[i]);
+    }
+    largest_chunk = std::max<std::size_t>(largest_chunk, chunk.positions.size_bytes() +
+                                                             chunk.normals.size_bytes() +
+                                                             chunk.wide_triangles.size_bytes());
+  }
+  void finish() override {}
+  std::uint64_t bytes() const override { return 0; }
+
+  PieceSink mesh;
+  std::size_t largest_chunk = 0;
+};
+
+/// With a limit that a small mesh exceeds.
+TEST_F(Pieces, OfMoreVerticesThan32BitsNumberHaveWideNumbers) {
+  const StoreReader reader = store(busy_field<std::uint8_t>({130, 97, 110}));
+  const ExtractOptions options{.isovalue = 49.5, .normals = true};
+  const PieceSink expected = whole(reader, options);
+  const auto paths = pieces(reader, options, 7);
+  WideSink sink;
+  const std::uint64_t limit = expected.positions.size() - 1;
+  merge_pieces_within(limit, paths, sink, {}, no_progress());
+  EXPECT_EQ(sink.mesh.positions, expected.positions);
+  EXPECT_EQ(sink.mesh.normals, expected.normals);
+  EXPECT_EQ(sink.mesh.triangles, expected.triangles);
+  PieceSink narrow;
+  merge_pieces_within(limit + 1, paths, narrow, {}, no_progress());
+  expect_same(narrow, expected);
+  EXPECT_THROW(merge_pieces_within(limit, paths, narrow, {}, no_progress()), Error);
 }
 
 TEST_F(Pieces, BecomeTheMeshOfASingleExtractionWhereSamplesAreMissing) {
