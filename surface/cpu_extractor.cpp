@@ -173,7 +173,7 @@ struct CpuExtractor::Impl {
     if (welded() && made.vertices > std::numeric_limits<std::uint32_t>::max())
       throw Error(
           "the mesh has more than 4294967295 vertices, which an indexed mesh of 32 bits "
-          "cannot number; extract it in parts with --roi, or as STL");
+          "cannot number; extract it by way of pieces (--resume), by regions (--roi) or as STL");
   }
 
   /// Gives the counted tiles from `begin` on their places in the mesh, as many as

@@ -247,12 +247,14 @@ int run_extract(const ExtractArguments& given, Console& console) {
   const std::vector<ExtractedSurface> surfaces = plan_surfaces(arguments, store, console);
   for (const ExtractedSurface& surface : surfaces)
     note_band(surface.options.isovalue, store.info(), console);
-  const CommandOutput output = arguments.estimate ? estimate_all(surfaces, store, console)
-                               : arguments.devices.size() > 1
-                                   ? make_on_devices(arguments, surfaces, store, console)
-                               : arguments.resume || job != nullptr
-                                   ? make_by_pieces(arguments, surfaces, store, job, console)
-                                   : make_all(arguments, surfaces, store, attributes, console);
+  const bool by_pieces = arguments.resume || job != nullptr ||
+                         (!arguments.estimate && arguments.devices.size() < 2 && !streams &&
+                          arguments.preview.path.empty() && need_pieces(surfaces, store));
+  const CommandOutput output =
+      arguments.estimate             ? estimate_all(surfaces, store, console)
+      : arguments.devices.size() > 1 ? make_on_devices(arguments, surfaces, store, console)
+      : by_pieces                    ? make_by_pieces(arguments, surfaces, store, job, console)
+                                     : make_all(arguments, surfaces, store, attributes, console);
   ordered_json result{{"command", "extract"},
                       {"input", arguments.input.path},
                       {"level", surfaces.front().options.level},

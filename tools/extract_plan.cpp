@@ -8,6 +8,7 @@
 #include <isobrick/error.h>
 #include "io/bytes/folder_walk.h"
 #include "io/bytes/leftovers.h"
+#include "pipeline/pieces/merge_limit.h"
 #include "pipeline/program_memory.h"
 #include "tools/format.h"
 #include "tools/isovalues.h"
@@ -352,6 +353,22 @@ void check_space(const std::vector<ExtractedSurface>& surfaces, const StoreReade
   if (const auto shortage = find_shortage(likely, free_space))
     throw Error(shortage_text(likely[shortage->mesh], *shortage,
                               is_standard_output(surfaces.front().output.native())));
+}
+
+bool need_pieces(const std::vector<ExtractedSurface>& surfaces, const StoreReader& store) {
+  return std::any_of(surfaces.begin(), surfaces.end(), [&](const ExtractedSurface& surface) {
+    // Mostly all that the active cells could hold is little, which is known without a sample.
+    const ExtractOptions& options = surface.options;
+    PlannedMesh mesh{
+        .form = surface.form,
+        .size = largest_mesh(count_active(store, options), options.topology, options.cap),
+        .filter = surface.filter};
+    if (!needs_pieces(mesh, kMaxNarrowVertices)) return false;
+    const ExtractEstimate guess = estimate_one(surface, store);
+    mesh.size = guess.mesh;
+    mesh.uncertainty = guess.uncertainty;
+    return needs_pieces(mesh, kMaxNarrowVertices);
+  });
 }
 
 /// Refuses a budget in which pictures cannot be drawn, before anything is extracted.

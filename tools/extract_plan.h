@@ -85,6 +85,10 @@ ExtractEstimate estimate_one(const ExtractedSurface& surface, const StoreReader&
 void check_space(const std::vector<ExtractedSurface>& surfaces, const StoreReader& store,
                  std::uint64_t parts = 1);
 
+/// Whether a mesh may have more vertices than an extraction numbers at once, and its format holds
+/// more: then it is to be made by way of pieces.
+bool need_pieces(const std::vector<ExtractedSurface>& surfaces, const StoreReader& store);
+
 /// Refuses a budget in which pictures cannot be drawn, before anything is extracted.
 void check_pictures(const std::vector<ExtractedSurface>& surfaces,
                     const ExtractArguments& arguments, const StoreReader& store);

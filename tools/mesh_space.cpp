@@ -93,4 +93,10 @@ std::optional<Shortage> find_shortage(
   return std::nullopt;
 }
 
+bool needs_pieces(const PlannedMesh& mesh, std::uint64_t max_narrow) {
+  return takes_wide(mesh.form.format) && !mesh.filter.changes_mesh() && !mesh.filter.measure &&
+         static_cast<double>(mesh.size.vertices) * (1 + mesh.uncertainty) >
+             static_cast<double>(max_narrow);
+}
+
 }  // namespace isobrick::tools

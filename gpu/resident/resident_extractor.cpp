@@ -158,7 +158,7 @@ struct ResidentExtractor::Impl {
       if (last.vertices > std::numeric_limits<std::uint32_t>::max())
         throw Error(
             "the mesh has more than 4294967295 vertices, which an indexed mesh of 32 bits cannot "
-            "number; extract it in parts with --roi");
+            "number; extract it by way of pieces (--resume) or by regions (--roi)");
       if (last.vertices <= room.positions.size() && last.triangles <= room.triangles.size())
         return last;
       const MeshSize needed{last.vertices, last.triangles};

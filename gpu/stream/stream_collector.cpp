@@ -193,7 +193,7 @@ void StreamCollector::check_numbers(std::uint64_t more) const {
   if (welded_ && report_.vertices + more > std::numeric_limits<std::uint32_t>::max())
     throw Error(
         "the mesh has more than 4294967295 vertices, which an indexed mesh of 32 bits "
-        "cannot number; extract it in parts with --roi, or as STL");
+        "cannot number; extract it by way of pieces (--resume), by regions (--roi) or as STL");
 }
 
 StreamCollector::Pending StreamCollector::start_download(InFlightLaunch& launch,

@@ -78,6 +78,11 @@ bool has_normals(MeshFormat format) {
 
 bool has_vertices(MeshFormat format) { return format != MeshFormat::stl; }
 
+bool takes_wide(MeshFormat format) {
+  return format == MeshFormat::obj || format == MeshFormat::glb || format == MeshFormat::vtp ||
+         format == MeshFormat::pvtp;
+}
+
 bool has_attributes(MeshFormat format) {
   return format != MeshFormat::stl && format != MeshFormat::obj && !has_levels(format);
 }

@@ -129,6 +129,32 @@ TEST(Mesh, ItsMemoryIsKnownBeforeItIsOpened) {
   EXPECT_EQ(mesh_file_memory(MeshFormat::ply, 0, 64 * kMiB), 0U);
 }
 
+TEST(Mesh, ItsFormatSaysWhetherItNumbersMoreThan32Bits) {
+  const TempDir dir;
+  for (const MeshFormat format :
+       {MeshFormat::ply, MeshFormat::stl, MeshFormat::obj, MeshFormat::glb, MeshFormat::vtp,
+        MeshFormat::pvtp, MeshFormat::tiles3d})
+    EXPECT_EQ(takes_wide(format),
+              create_mesh_file(dir / "a", {.format = format, .force = true})->takes_wide())
+        << name_of(format);
+}
+
+TEST(Mesh, ItIsMadeOfPiecesWhereAnExtractionCannotNumberIt) {
+  const PlannedMesh mesh{.form = {.format = MeshFormat::pvtp},
+                         .size = {.vertices = 1000, .triangles = 2000},
+                         .uncertainty = 0.1};
+  EXPECT_TRUE(needs_pieces(mesh, 1000));
+  EXPECT_TRUE(needs_pieces(mesh, 1099));
+  EXPECT_FALSE(needs_pieces(mesh, 1100));
+  PlannedMesh ply = mesh, smooth = mesh, metres = mesh;
+  ply.form.format = MeshFormat::ply;
+  EXPECT_FALSE(needs_pieces(ply, 1000));
+  smooth.filter.smooth = 3;
+  EXPECT_FALSE(needs_pieces(smooth, 1000));
+  metres.filter.unit = "meter";
+  EXPECT_TRUE(needs_pieces(metres, 1000));
+}
+
 TEST(Space, AMeshNeedsItsScratchFileToo) {
   const MeshSize size{.vertices = 100, .triangles = 200};
   const MeshBytes ply = predict_bytes({.format = MeshFormat::ply}, size);
