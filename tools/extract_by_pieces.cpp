@@ -11,6 +11,7 @@
 #include "pipeline/pieces/piece_maker.h"
 #include "ranks/share_plans.h"
 #include "ranks/write_ply.h"
+#include "ranks/write_pvtp.h"
 #include "tools/extract_part.h"
 #include "tools/interrupt.h"
 #include "tools/merge.h"
@@ -140,8 +141,8 @@ void put_sums(const PieceSums& sums, ExtractReport& r) {
 
 /// Whether the ranks can write their pieces of the mesh as they are.
 bool is_written_by_all(const ExtractArguments& arguments, const ExtractedSurface& surface) {
-  return surface.form.format == MeshFormat::ply && !surface.filter.any() &&
-         arguments.attributes.empty();
+  return (surface.form.format == MeshFormat::ply || surface.form.format == MeshFormat::pvtp) &&
+         !surface.filter.any() && arguments.attributes.empty();
 }
 
 /// Of a rank's budget, what pieces may take that wait for their places in the mesh.
@@ -258,8 +259,13 @@ MergeResult put_together(const ExtractArguments& arguments, const ExtractedSurfa
   MergeResult made;
   if (job != nullptr && is_written_by_all(arguments, surface)) {
     const Stopwatch watch(made.seconds);
-    made.size = write_ply(*job, maker.parts(), std::move(pieces.own), maker.header(),
-                          surface.output, arguments.force, console.progress());
+    auto& progress = console.progress();
+    if (surface.form.format == MeshFormat::pvtp)
+      made.size = write_pvtp(*job, maker.parts(), std::move(pieces.own), maker.header(),
+                             surface.output, arguments.force, progress);
+    else
+      made.size = write_ply(*job, maker.parts(), std::move(pieces.own), maker.header(),
+                            surface.output, arguments.force, progress);
     made.filtered.extracted = made.size;
     made.bytes = mesh_bytes(surface.output);
     if (made.size.triangles == 0)

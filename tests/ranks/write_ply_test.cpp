@@ -1,19 +1,16 @@
 #include <atomic>
 
 #include <isobrick/mesh_file_sink.h>
-#include "pipeline/pieces/piece_maker.h"
 #include "pipeline/pieces/piece_reader.h"
-#include "ranks/share_plans.h"
-#include "ranks/thread_ranks.h"
 #include "ranks/write_ply.h"
-#include "tests/pipeline/pieces_fixture.h"
+#include "tests/ranks/rank_pieces.h"
 
 namespace isobrick::test {
 namespace {
 
 namespace fs = std::filesystem;
 
-class WritePly : public Pieces {
+class WritePly : public RankPieces {
  protected:
   /// The file of one process.
   std::string expected(const StoreReader& store, const ExtractOptions& options) {
@@ -30,40 +27,15 @@ class WritePly : public Pieces {
     return {store, options, PieceMaker::plan(store, options, 3)};
   }
 
-  fs::path path_of(std::uint32_t number) {
-    return folder_ / ("r" + std::to_string(number) + ".piece");
-  }
-
-  /// Makes the pieces that this rank gets.
-  std::vector<OwnPiece> make(Ranks& ranks, const PieceMaker& maker, bool in_memory = false) {
-    std::vector<OwnPiece> own;
-    deal(ranks, maker.parts().count(), [&](std::uint64_t i) {
-      const auto number = static_cast<std::uint32_t>(i + 1);
-      if (in_memory) {  // and part of it in a file without a name
-        auto piece = std::make_shared<BufferedPiece>(
-            open_scratch_beside((folder_ / "scratch").string(), i % 2 << 22));
-        maker.append(number, piece->writer(), no_progress());
-        own.push_back({number, std::move(piece)});
-      } else {
-        maker.make(number, path_of(number), true, no_progress());
-        own.push_back({number, open_piece_file(path_of(number))});
-      }
-    });
-    return own;
-  }
-
   /// That of so many ranks.
   std::string of_ranks(int ranks, const StoreReader& store, ExtractOptions options,
                        std::uint32_t parts, bool in_memory = false) {
-    options.threads = 1;
     const fs::path path = folder_ / "ranks.ply";
-    run_on_threads(ranks, [&](Ranks& job) {
-      const PieceMaker maker(store, options, share_plans(job, [&] {
-                               return PieceMaker::plan(store, options, parts);
-                             }));
-      write_ply(job, maker.parts(), make(job, maker, in_memory), maker.header(), path, true,
-                no_progress());
-    });
+    on_ranks(ranks, store, std::move(options), parts, in_memory,
+             [&](Ranks& job, const PieceMaker& maker, std::vector<OwnPiece> pieces) {
+               write_ply(job, maker.parts(), std::move(pieces), maker.header(), path, true,
+                         no_progress());
+             });
     return content_of_piece(path);
   }
 };

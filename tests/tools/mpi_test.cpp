@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <csignal>
+#include <map>
 
 #include <fmt/format.h>
 
@@ -94,6 +95,26 @@ TEST_F(Mpi, EveryFormatAndFilterIsThatOfOneProcess) {
     EXPECT_TRUE(read_file(path("ranks_" + form[0])) == read_file(path("one_" + form[0])))
         << form[0];
   }
+}
+
+TEST_F(Mpi, RanksWriteThePartsOfAPvtp) {
+  const auto content = [&](const std::string& folder) {
+    std::map<std::string, std::string> files;
+    for (const auto& entry : fs::recursive_directory_iterator(path(folder)))
+      if (entry.is_regular_file())
+        files[fs::relative(entry.path(), path(folder)).string()] = read_file(entry.path());
+    return files;
+  };
+  for (const char* folder : {"one", "ranks"}) fs::create_directory(path(folder));
+  run_json(extract("one/m.pvtp"));
+  const auto made = mpirun_json(3, extract("ranks/m.pvtp"));
+  const auto whole = content("one");
+  EXPECT_EQ(whole.size(), 2u);
+  EXPECT_TRUE(content("ranks") == whole);
+  // What is there already is refused, once.
+  const Outcome again = mpirun(2, extract("ranks/m.pvtp"));
+  EXPECT_EQ(own_lines(again.err).size(), 1u) << again.err;
+  EXPECT_TRUE(content("ranks") == whole);
 }
 
 TEST_F(Mpi, SeveralIsovaluesAreSeveralMeshes) {
