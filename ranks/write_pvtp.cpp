@@ -77,11 +77,12 @@ std::vector<MeshRun> write_scratch(Ranks& ranks, const PvtpNames& names, const M
 
 /// How many parts became of a run.
 struct RunParts {
-  std::uint64_t run = 0, parts = 0;
+  std::uint64_t run = 0;
+  std::uint32_t parts = 0;
 };
 
 /// Collective: writes the parts, each run on one rank. Returns how many each run has.
-std::vector<std::uint64_t> write_parts(Ranks& ranks, const PvtpNames& names,
+std::vector<std::uint32_t> write_parts(Ranks& ranks, const PvtpNames& names,
                                        const MeshHeader& header, const std::vector<MeshRun>& runs,
                                        std::uint64_t run_triangles, Progress& progress) {
   const File rows = open_input(names.rows), triangles = open_input(names.triangles);
@@ -106,20 +107,10 @@ std::vector<std::uint64_t> write_parts(Ranks& ranks, const PvtpNames& names,
     });
     progress.advance(1);
   });
-  std::vector<std::uint64_t> counts(runs.size());
+  std::vector<std::uint32_t> counts(runs.size());
   for (const Ranks::Bytes& of_rank : ranks.gather(std::as_bytes(std::span(own))))
     for (const RunParts& made : to_items<RunParts>(of_rank)) counts.at(made.run) = made.parts;
   return counts;
-}
-
-/// Writes the index, and gives all its name.
-void publish(PvtpFiles& files, const MeshHeader& header, const std::vector<std::uint64_t>& counts) {
-  std::vector<std::string> references;
-  for (std::size_t run = 0; run < counts.size(); ++run)
-    for (std::uint32_t number = 0; number < counts[run]; ++number)
-      references.push_back(files.out.reference(part_name(run, number, kVtpExtension)));
-  files.out.index().writer().append(pvtp_index(header, references));
-  files.out.publish();
 }
 
 }  // namespace
@@ -136,7 +127,10 @@ MeshSize write_pvtp(Ranks& ranks, const PartPlans& parts, std::vector<OwnPiece> 
   const std::vector<MeshRun> runs = write_scratch(ranks, names, header, places, std::move(pieces),
                                                   limits.part_triangles, progress);
   const auto counts = write_parts(ranks, names, header, runs, limits.part_triangles, progress);
-  if (files) publish(*files, header, counts);
+  if (files) {
+    files->out.index().writer().append(pvtp_index(header, files->out, counts));
+    files->out.publish();
+  }
   ranks.wait_for_all();
   progress.end();
   return places.mesh;

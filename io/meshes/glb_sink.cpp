@@ -50,13 +50,13 @@ void GlbSink::write(const MeshChunk& chunk) {
   bounds_.include(chunk.positions);
 }
 
-GlbPrimitive GlbSink::append_part(FileWriter& out, const MeshPart& part) {
+GlbPrimitive GlbSink::append_part(FileWriter& out, const StoredMesh& mesh, const MeshPart& part) {
   GlbPrimitive primitive{.vertices = part.vertices(), .triangles = part.triangles};
   primitive.vertex_bytes = part.vertices() * vertices_.row_bytes();
-  for_each_row_batch(stored(), part, [&](std::span<const std::byte> rows) {
+  for_each_row_batch(mesh, part, [&](std::span<const std::byte> rows) {
     primitive.bounds.include(vertices_.append(out, rows));
   });
-  for_each_triangle_batch(stored(), part, [&](std::span<const Triangle> triangles) {
+  for_each_triangle_batch(mesh, part, [&](std::span<const Triangle> triangles) {
     out.append(std::as_bytes(triangles));
   });
   return primitive;
@@ -66,18 +66,20 @@ void GlbSink::finish_whole(const GlbPrimitive& primitive) {
   FileWriter& out = output().index().writer();
   out.append(glb_start(glb_json(vertices_, {&primitive, 1}), primitive.bytes()));
   if (vertices_.quantized)
-    append_part(out, {.triangles = size().triangles, .own_vertices = size().vertices});
+    append_part(out, stored(), {.triangles = size().triangles, .own_vertices = size().vertices});
   else
     append_whole(out);
 }
 
 void GlbSink::finish_parts() {
   std::vector<GlbPrimitive> primitives;
-  write_parts(kPartExtension, [&](FileWriter& out, const MeshPart& part) {
-    const std::string uri = output().reference(part_name(part.run, part.number, kPartExtension));
-    primitives.push_back(append_part(out, part));
-    primitives.back().uri = percent_encoded(uri);
-  });
+  write_parts(kPartExtension, 1,
+              [&](FileWriter& out, const StoredMesh& mesh, const MeshPart& part) {
+                const std::string uri =
+                    output().reference(part_name(part.run, part.number, kPartExtension));
+                primitives.push_back(append_part(out, mesh, part));
+                primitives.back().uri = percent_encoded(uri);
+              });
   output().index().writer().append(glb_start(glb_json(vertices_, primitives), 0));
 }
 

@@ -35,7 +35,7 @@ class GlbSink final : public PartedMeshSink {
   void finish() override;
 
  private:
-  GlbPrimitive append_part(FileWriter& out, const MeshPart& part);
+  GlbPrimitive append_part(FileWriter& out, const StoredMesh& mesh, const MeshPart& part);
   void finish_whole(const GlbPrimitive& primitive);
   void finish_parts();
 

@@ -111,7 +111,9 @@ std::unique_ptr<MeshSink> create_mesh_file(const std::filesystem::path& path,
       return std::make_unique<GlbSink>(name, force, GlbOptions{.quantize = options.quantize});
     case MeshFormat::vtp:
       return std::make_unique<VtpSink>(name, force, waiting_memory(options.memory));
-    case MeshFormat::pvtp: return std::make_unique<PvtpSink>(name, force);
+    case MeshFormat::pvtp:
+      return std::make_unique<PvtpSink>(name, force, PvtpSink::kPartTriangles,
+                                        PvtpSink::threads_within(options.threads, options.memory));
     case MeshFormat::neuroglancer:
     case MeshFormat::tiles3d:
       return create_level_mesh(
@@ -130,7 +132,7 @@ std::uint64_t mesh_file_memory(MeshFormat format, int threads, std::uint64_t mem
     case MeshFormat::vtp: return waiting_memory(memory);
     case MeshFormat::obj: return ObjSink::memory_with(threads);
     case MeshFormat::glb: return part_memory(GlbOptions{}.part_triangles);
-    case MeshFormat::pvtp: return part_memory(PvtpSink::kPartTriangles);
+    case MeshFormat::pvtp: return PvtpSink::memory_with(PvtpSink::threads_within(threads, memory));
     case MeshFormat::neuroglancer:
     case MeshFormat::tiles3d:
       return level_memory({.threads = threads, .memory = level_share(memory)});

@@ -42,9 +42,11 @@ class PartedMeshSink : public MeshSink {
   /// What was written so far, to be read while the sink lives and its scratch files do.
   const StoredMesh& stored() const { return stored_; }
 
-  /// Creates a file for each part of the mesh, in order, and calls write_part(file, part).
-  void write_parts(std::string_view extension,
-                   const std::function<void(FileWriter&, const MeshPart&)>& write_part);
+  /// Creates a file for each part of the mesh and calls write_part(file, mesh, part), on `threads`
+  /// threads at a time; in order with one. Returns the number of parts of each run.
+  std::vector<std::uint32_t> write_parts(
+      std::string_view extension, int threads,
+      const std::function<void(FileWriter&, const StoredMesh&, const MeshPart&)>& write_part);
   /// Appends the whole mesh: rows as append_rows() writes them, then triangles of UInt32.
   void append_whole(FileWriter& out);
 

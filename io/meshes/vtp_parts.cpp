@@ -6,6 +6,7 @@
 #include <filesystem>
 
 #include <isobrick/error.h>
+#include "io/bytes/leftovers.h"
 #include "io/bytes/xml_text.h"
 #include "io/meshes/append_items.h"
 #include "io/meshes/vertex_rows.h"
@@ -90,7 +91,8 @@ void write_vtp_part(FileWriter& out, const StoredMesh& mesh, const MeshHeader& h
   append_vtp_end(out, layout);
 }
 
-std::string pvtp_index(const MeshHeader& header, std::span<const std::string> references) {
+std::string pvtp_index(const MeshHeader& header, const PartedOutput& output,
+                       std::span<const std::uint32_t> parts) {
   std::string text =
       "<?xml version=\"1.0\"?>\n"
       "<VTKFile type=\"PPolyData\" version=\"1.0\" byte_order=\"LittleEndian\" "
@@ -101,8 +103,10 @@ std::string pvtp_index(const MeshHeader& header, std::span<const std::string> re
       "    <PPoints>\n"
       "      <PDataArray type=\"Float32\" Name=\"Points\" NumberOfComponents=\"3\"/>\n"
       "    </PPoints>\n";
-  for (const std::string& reference : references)
-    text += fmt::format("    <Piece Source=\"{}\"/>\n", xml_escaped(reference));
+  for (std::size_t run = 0; run < parts.size(); ++run)
+    for (std::uint32_t number = 0; number < parts[run]; ++number)
+      text += fmt::format("    <Piece Source=\"{}\"/>\n",
+                          xml_escaped(output.reference(part_name(run, number, kVtpExtension))));
   return text + "  </PPolyData>\n</VTKFile>\n";
 }
 

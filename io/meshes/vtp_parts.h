@@ -1,11 +1,13 @@
 #pragma once
 
+#include <cstdint>
 #include <span>
 #include <string>
 #include <string_view>
 
 #include <isobrick/mesh.h>
 #include "io/bytes/output_file.h"
+#include "io/bytes/parted_output.h"
 #include "io/meshes/mesh_parts.h"
 
 // The files of a VTK partitioned PolyData (.pvtp): the parts, each a .vtp, and the index that names
@@ -23,7 +25,8 @@ void check_pvtp_name(const std::string& path);
 void write_vtp_part(FileWriter& out, const StoredMesh& mesh, const MeshHeader& header,
                     const MeshPart& part);
 
-/// The index of the parts at these places, relative to its own folder.
-std::string pvtp_index(const MeshHeader& header, std::span<const std::string> references);
+/// The index, of as many parts in each run of the mesh.
+std::string pvtp_index(const MeshHeader& header, const PartedOutput& output,
+                       std::span<const std::uint32_t> parts);
 
 }  // namespace isobrick

@@ -1,10 +1,11 @@
 #include "io/meshes/vtp_sink.h"
 
+#include <tbb/info.h>
+
 #include <algorithm>
 #include <span>
 #include <utility>
 
-#include "io/bytes/leftovers.h"
 #include "io/meshes/vtp_parts.h"
 
 namespace isobrick::inline v0 {
@@ -90,17 +91,35 @@ void VtpSink::append_widened(FileWriter& out) {
   }
 }
 
-PvtpSink::PvtpSink(std::string path, bool force, std::uint64_t part_triangles)
-    : PartedMeshSink(checked_pvtp_name(std::move(path)), force, part_triangles) {}
+PvtpSink::PvtpSink(std::string path, bool force, std::uint64_t part_triangles, int threads)
+    : PartedMeshSink(checked_pvtp_name(std::move(path)), force, part_triangles),
+      part_triangles_(part_triangles),
+      threads_(threads) {}
+
+int PvtpSink::threads_within(int threads, std::uint64_t memory) {
+  constexpr int most = 8;  // beyond, the disk bounds
+  const auto affordable =
+      static_cast<int>(std::min<std::uint64_t>(most, memory / 8 / memory_with(2)));
+  const int wanted = threads > 0 ? threads : tbb::info::default_concurrency();
+  return std::max(1, std::min(wanted, affordable));
+}
+
+std::uint64_t PvtpSink::memory_with(int threads, std::uint64_t part_triangles) {
+  // A file, rows and triangles of a part are in buffers.
+  constexpr std::uint64_t buffers = 4 * FileWriter::kBuffer;
+  const auto others = static_cast<std::uint64_t>(threads - 1);
+  return part_memory(part_triangles) + others * (part_memory(part_triangles) + buffers);
+}
+
+std::uint64_t PvtpSink::memory() const { return memory_with(threads_, part_triangles_); }
 
 void PvtpSink::finish() {
   const MeshHeader header{.has_normals = has_normals(), .unit = unit(), .attributes = attributes()};
-  std::vector<std::string> references;
-  write_parts(kVtpExtension, [&](FileWriter& out, const MeshPart& part) {
-    write_vtp_part(out, stored(), header, part);
-    references.push_back(output().reference(part_name(part.run, part.number, kVtpExtension)));
-  });
-  output().index().writer().append(pvtp_index(header, references));
+  const auto parts = write_parts(
+      kVtpExtension, threads_, [&](FileWriter& out, const StoredMesh& mesh, const MeshPart& part) {
+        write_vtp_part(out, mesh, header, part);
+      });
+  output().index().writer().append(pvtp_index(header, output(), parts));
   release_scratch();
   output().publish();
 }

@@ -43,9 +43,20 @@ class VtpSink final : public MeshSink {
 class PvtpSink final : public PartedMeshSink {
  public:
   /// See PartedOutput for what `path` and `force` may throw, and check_pvtp_name().
-  PvtpSink(std::string path, bool force, std::uint64_t part_triangles = kPartTriangles);
+  /// `threads` write parts at the same time; the files never depend on them.
+  PvtpSink(std::string path, bool force, std::uint64_t part_triangles = kPartTriangles,
+           int threads = 1);
 
   void finish() override;
+  std::uint64_t memory() const override;
+
+  /// How many threads a budget of the whole operation allows, and what they take.
+  static int threads_within(int threads, std::uint64_t memory);
+  static std::uint64_t memory_with(int threads, std::uint64_t part_triangles = kPartTriangles);
+
+ private:
+  std::uint64_t part_triangles_;
+  int threads_;
 };
 
 }  // namespace isobrick

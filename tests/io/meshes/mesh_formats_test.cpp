@@ -130,7 +130,7 @@ TEST(MeshFormats, ChunksAndThreadsNeverShow) {
       {"obj", [](auto path, int n) { return std::make_unique<ObjSink>(path, false, n); }},
       {"glb", [](auto path, int) { return std::make_unique<GlbSink>(path, false); }},
       {"vtp", [](auto path, int) { return std::make_unique<VtpSink>(path, false); }},
-      {"pvtp", [](auto path, int) { return std::make_unique<PvtpSink>(path, false, 1000); }}};
+      {"pvtp", [](auto path, int n) { return std::make_unique<PvtpSink>(path, false, 1000, n); }}};
   for (const auto& [name, open] : sinks) {
     int n = 0;
     for (const Chunks& chunks : {make_chunks(100), make_chunks(3001), make_chunks(1 << 30),
