@@ -26,7 +26,8 @@ struct ConvertArguments {
   VolumeRequest volume;
   RegionArguments region;
   ConvertOptions store;
-  bool mpi = true;  ///< the ranks of a job share the work
+  CacheOptions cache;  ///< of an input behind a URL
+  bool mpi = true;     ///< the ranks of a job share the work
 };
 
 /// Samples of a part that ranks share, as many as a unit of parts has. By the volume alone, so that
@@ -35,13 +36,13 @@ constexpr std::uint64_t kPartSamples = std::uint64_t{512} * 512 * 512;
 constexpr std::uint64_t kMostParts = 4096;
 
 std::unique_ptr<VolumeSource> open_input(const ConvertArguments& arguments,
-                                         const ConvertOptions& options) {
+                                         const ConvertOptions& options, Console& console) {
   VolumeRequest volume = arguments.volume;
   volume.roi = arguments.region.roi;
   volume.region = arguments.region.region;
   volume.memory = options.memory;
   volume.threads = options.threads;
-  return open_any_source(arguments.in, volume);
+  return open_any_source(arguments.in, volume, remote_options(arguments.cache, console));
 }
 
 /// What the input's name means on the disk: of FILE:/NAME the file, of standard input nothing.
@@ -118,7 +119,7 @@ int convert_to_bucket(const ConvertArguments& arguments, const std::string& out,
     throw UsageError(fmt::format(
         "'{}': the ranks of a job write to a folder; convert to one, or with one process", out));
   BucketOutput bucket(out, options.force, options.memory);
-  const auto source = open_input(arguments, options);
+  const auto source = open_input(arguments, options, console);
   note_downsampling(*source, options, console);
   set_interrupt_note([] { return "the same command with --force begins anew"; });
   const ConvertReport report = convert(*source, bucket.folder(), options, console.progress());
@@ -137,7 +138,7 @@ int run_convert(const ConvertArguments& arguments, Console& console) {
   const bool is_whole = !options.part && options.join == 0;
   Ranks* const job = is_whole ? join_job(arguments.mpi, console) : nullptr;
   if (job != nullptr) share_machine(*job, options.memory, options.threads);
-  const auto source = open_input(arguments, options);
+  const auto source = open_input(arguments, options, console);
   options.inputs = input_paths(arguments.in);
   if (options.part || job != nullptr)
     set_interrupt_note([] { return "the same command goes on with what is done"; });
@@ -172,6 +173,7 @@ void add_convert(Program& program) {
       "head.zarr of head.nrrd, run_data.zarr of run.h5:/data, in the current folder");
   add_volume_options(app, arguments->volume);
   add_region(app, arguments->region);
+  add_remote_cache(app, arguments->cache, "Where parts of an input behind a URL are kept");
   add_store_options(app, arguments->store);
   add_parsed(
       app, arguments->store.part,

@@ -46,6 +46,23 @@ void add_volume_options(CLI::App* app, VolumeRequest& volume) {
              {"--nodata", "V", "Samples of this value are missing: no surface touches them"});
 }
 
+void add_remote_cache(CLI::App* app, CacheOptions& cache, const std::string& description) {
+  cache.folder = default_cache_folder();
+  add_parsed(app, cache.folder, parse_cache,
+             {"--cache", "DIR|none", description, "~/.cache/isobrick"});
+  add_parsed(app, cache.remote_limit, parse_remote_cache,
+             {"--remote-cache", "BYTES|none",
+              "Bytes of stores behind URLs that are kept in the folder of --cache", "none"});
+}
+
+RemoteOptions remote_options(const CacheOptions& cache, Console& console) {
+  RemoteOptions options;
+  options.cache_folder = cache.folder;
+  options.cache_limit = cache.remote_limit;
+  options.on_note = [&console](const std::string& note) { console.note(note); };
+  return options;
+}
+
 void add_input(CLI::App* app, InputArguments& input, bool required) {
   add_text(app,
            {"INPUT", "",
@@ -55,24 +72,14 @@ void add_input(CLI::App* app, InputArguments& input, bool required) {
             "", required},
            [&path = input.path](const std::string& text) { path = text; });
   add_volume_options(app, input.volume);
-  input.cache.folder = default_cache_folder();
-  add_parsed(app, input.cache.folder, parse_cache,
-             {"--cache", "DIR|none",
-              "Where stores of inputs that are none are kept; none: they go with the command",
-              "~/.cache/isobrick"});
+  add_remote_cache(app, input.cache,
+                   "Where stores of inputs that are none are kept; none: they go with the command");
   add_parsed(app, input.cache.limit, parse_bytes,
              {"--cache-limit", "BYTES", "Bytes of all stores that are kept", "20G"});
-  add_parsed(app, input.cache.remote_limit, parse_remote_cache,
-             {"--remote-cache", "BYTES|none",
-              "Bytes of stores behind URLs that are kept in the folder of --cache", "none"});
 }
 
 std::shared_ptr<const Storage> open_input_storage(const InputArguments& input, Console& console) {
-  RemoteOptions options;
-  options.cache_folder = input.cache.folder;
-  options.cache_limit = input.cache.remote_limit;
-  options.on_note = [&console](const std::string& note) { console.note(note); };
-  return open_storage(input.path, options);
+  return open_storage(input.path, remote_options(input.cache, console));
 }
 
 OpenedVolume open_input(const InputArguments& input, std::uint64_t memory, int threads,

@@ -23,6 +23,12 @@ void add_input(CLI::App* app, InputArguments& input, bool required = true);
 /// among several volumes.
 void add_volume_options(CLI::App* app, VolumeRequest& volume);
 
+/// The options of the cache for what lies behind URLs; `description` says what its folder is for.
+void add_remote_cache(CLI::App* app, CacheOptions& cache, const std::string& description);
+
+/// How a URL is read by the options above. `console` must live as long as what is read.
+RemoteOptions remote_options(const CacheOptions& cache, Console& console);
+
 /// Opens the storage of an input that is a store or Zarr, with the cache for remote ones. `console`
 /// must live as long as the storage.
 std::shared_ptr<const Storage> open_input_storage(const InputArguments& input, Console& console);

@@ -17,8 +17,9 @@ namespace {
 
 class StoreSource final : public VolumeSource {
  public:
-  StoreSource(const std::string& path, const VolumeRequest& request, int threads)
-      : store_(path, request.selection),
+  StoreSource(const std::string& path, const VolumeRequest& request, int threads,
+              const RemoteOptions& remote)
+      : store_(open_storage(path, remote), request.selection),
         threads_(threads > 0 ? threads : tbb::info::default_concurrency()),
         arena_(threads_) {
     const LevelInfo& finest = store_.info().levels.front();
@@ -62,16 +63,17 @@ class StoreSource final : public VolumeSource {
 }  // namespace
 
 std::unique_ptr<VolumeSource> open_store_source(const std::string& path,
-                                                const VolumeRequest& request, int threads) {
+                                                const VolumeRequest& request, int threads,
+                                                const RemoteOptions& remote) {
   refuse_raw_description(path, "Zarr", request);
-  return select_samples(std::make_unique<StoreSource>(path, request, threads), request);
+  return select_samples(std::make_unique<StoreSource>(path, request, threads, remote), request);
 }
 
-std::unique_ptr<VolumeSource> open_any_source(const std::string& path,
-                                              const VolumeRequest& request) {
+std::unique_ptr<VolumeSource> open_any_source(const std::string& path, const VolumeRequest& request,
+                                              const RemoteOptions& remote) {
   if (!is_zarr(path)) return open_source(path, request);
   refuse_grid(path, request);
-  return open_store_source(path, request, request.threads);
+  return open_store_source(path, request, request.threads, remote);
 }
 
 }  // namespace isobrick

@@ -86,6 +86,26 @@ TEST_F(RemoteCache, ZipsAskOnce) {
   EXPECT_LT(traffic.bytes, 10);  // of the request for the traffic itself
 }
 
+TEST_F(RemoteCache, ConversionsReadFromIt) {
+  const auto convert = [&](const std::string& input, const std::string& output) {
+    const Outcome outcome = run(cached({"convert", input, path(output), "-f"}));
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+    EXPECT_EQ(outcome.err, "");
+  };
+  convert(path("served/smooth.zarr"), "expected.zarr");
+  server_->take_traffic();
+  convert(url(), "c.zarr");
+  const auto first = server_->take_traffic();
+  convert(url(), "c.zarr");
+  const auto second = server_->take_traffic();
+  EXPECT_GT(first.requests, 10);
+  EXPECT_LE(second.requests, 4);
+  EXPECT_LT(second.bytes, first.bytes / 10);
+  for (const char* name : {"c.zarr", "expected.zarr"})
+    EXPECT_EQ(run({"verify", path(name)}).exit_code, 0) << name;
+  EXPECT_TRUE(mesh_of(path("c.zarr")) == mesh_of(path("expected.zarr")));
+}
+
 TEST_F(RemoteCache, OffUnlessRequested) {
   const Outcome outcome = run({"extract", url(), "--isovalue", "127.5", "-o", path("m.ply"),
                                "--cache", path("cache"), "-q"});
