@@ -11,6 +11,7 @@
 #include "core/morton.h"
 #include "core/stopwatch.h"
 #include "pipeline/extract/mesh_header.h"
+#include "pipeline/labels/label_meshes.h"
 #include "pipeline/labels/label_pass.h"
 #include "pipeline/volume/volume_samples.h"
 
@@ -70,9 +71,21 @@ LabelReport extract_labels(const Volume& volume, const LabelOptions& options,
     const Stopwatch watch(seconds);
     const VolumeSamples samples(volume);
     check_transform(samples.transform, samples.lattice.extent, "the volume");
-    LabelPlan plan = plan_label_memory(samples.lattice.type, read_bytes(samples, options), options);
-    LabelPass pass({"the volume", samples.lattice, samples.transform}, options, plan, progress);
-    const Box3 tiles = pass.tiles();
+    const LabelPlan plan =
+        plan_label_memory(samples.lattice.type, read_bytes(samples, options), options);
+    const LabelImage image{.name = "the volume",
+                           .extent = samples.lattice.extent,
+                           .type = samples.lattice.type,
+                           .transform = samples.transform,
+                           .roi = options.roi.value_or(samples.lattice.box()),
+                           .labels = {options.labels, options.background},
+                           .smoothing = label_smoothing(options)};
+    LabelMeshes meshes(image,
+                       {options.scratch_beside, plan.label_bytes, plan.meshes, options.cancel});
+    LabelPass pass(
+        image, options, plan, [&](std::span<const std::byte> packed) { meshes.append(packed); },
+        progress);
+    const Box3 tiles = image.tiles();
     pass.begin(static_cast<std::uint64_t>(isobrick::volume(tiles.extent())));
     const ReadSamples read(samples);
     const TileSamples& source =
@@ -88,7 +101,8 @@ LabelReport extract_labels(const Volume& volume, const LabelOptions& options,
       if (some.size() == kTilesAtOnce) make();
     });
     make();
-    report = pass.finish(visit);
+    pass.end();
+    report = meshes.finish(pass.workers(), visit, progress);
   }
   report.seconds = seconds;
   return report;

@@ -37,6 +37,7 @@ class Frontier {
         named.push_back({cell, {first + static_cast<std::uint32_t>(i), positions[i]}});
       last_cell = cell;
     }
+    vertices_ = first + static_cast<std::uint32_t>(positions.size());
     const Int3 lowest = max(piece.tile - Int3{1, 1, 1}, {0, 0, 0});
     until_.push({morton_encode(lowest), morton_encode(piece.tile)});
   }
@@ -51,6 +52,7 @@ class Frontier {
                          [](const Named& n, std::uint32_t cell) { return n.cell < cell; });
     if (at == named.end() || at->cell != vertex.cell()) missing();
     // The sheets of a cell follow one another, all at the same place.
+    if (vertex.sheet() >= vertices_ - at->first.number) missing();
     return {at->first.number + vertex.sheet(), at->first.position};
   }
 
@@ -72,10 +74,11 @@ class Frontier {
     return std::find(place.begin(), place.end(), TileCells::kBefore) != place.end();
   }
   [[noreturn]] static void missing() {
-    throw std::logic_error("a label's tile names a vertex that its neighbour does not have");
+    throw DamageError("a label's tile names a vertex that its neighbour does not have");
   }
 
   std::unordered_map<std::uint64_t, std::vector<Named>> vertices_of_;  ///< by the tile's code
+  std::uint32_t vertices_ = 0;                                         ///< so far
   /// The last tile that needs another one, and that one.
   std::priority_queue<std::pair<std::uint64_t, std::uint64_t>> until_;
 };

@@ -15,9 +15,6 @@
 namespace isobrick::inline v0 {
 namespace {
 
-/// For 16,000 labels.
-constexpr std::uint64_t kLeastForLabels = std::uint64_t{4} << 20;
-
 /// What takes memory besides tiles and labels.
 struct Needs {
   ScalarType type;

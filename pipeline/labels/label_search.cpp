@@ -60,7 +60,9 @@ void LabelSearch::append_tiles(Int3 chunk, Box3 box, std::span<const double>,
   bytes_read_ += table.bytes_read;
   append_tiles_where(
       table.box, [&](Int3 block) { return needs(block, table.at(block)); }, tiles.front());
-  std::erase_if(tiles.front(), [&](const TileWork& work) { return !box.contains(work.tile); });
+  std::erase_if(tiles.front(), [&](const TileWork& work) {
+    return !box.contains(work.tile) || !range_.contains(work.tile);
+  });
 }
 
 }  // namespace isobrick

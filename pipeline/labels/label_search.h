@@ -4,6 +4,7 @@
 #include <vector>
 
 #include <isobrick/labels.h>
+#include "core/tile_range.h"
 #include "stream/block_search.h"
 
 namespace isobrick::inline v0 {
@@ -29,9 +30,10 @@ class LabelSelection {
 /// chosen label in their range that have more than one value or lie at the region's border.
 class LabelSearch final : public BlockSearch {
  public:
-  /// Both must outlive it.
-  LabelSearch(const StoreReader& store, int level, const LabelSelection& labels, Box3 roi)
-      : store_(store), level_(level), labels_(labels), roi_(roi) {}
+  /// Only tiles of `range`. The others must outlive it.
+  LabelSearch(const StoreReader& store, int level, const LabelSelection& labels, Box3 roi,
+              const TileRange& range)
+      : store_(store), level_(level), labels_(labels), roi_(roi), range_(range) {}
 
   /// `isovalues` does not matter.
   void append_tiles(Int3 chunk, Box3 box, std::span<const double> isovalues,
@@ -45,6 +47,7 @@ class LabelSearch final : public BlockSearch {
   int level_;
   const LabelSelection& labels_;
   Box3 roi_;
+  TileRange range_;
   std::uint64_t bytes_read_ = 0;
 };
 

@@ -4,23 +4,10 @@
 #include <cstring>
 
 #include "core/morton.h"
+#include "pipeline/labels/label_record.h"
 
 namespace isobrick::inline v0 {
 namespace {
-
-/// Before the items of a piece.
-struct PieceHeader {
-  std::uint64_t previous = LabelSpool::kNoPiece;
-  std::uint64_t tile = 0;  ///< its Morton code
-  std::int64_t label = 0;
-  std::uint32_t vertices = 0, foreign = 0, quads = 0;
-  std::uint32_t unused = 0;
-
-  std::size_t item_bytes() const {
-    return vertices * sizeof(LabelVertex) + foreign * sizeof(ForeignVertex) +
-           quads * sizeof(LabelQuad);
-  }
-};
 
 template <class T>
 std::byte* put(std::byte* to, std::span<const T> items) {
@@ -40,22 +27,23 @@ const std::byte* take(const std::byte* from, std::size_t count, std::vector<T>& 
 std::uint64_t LabelSpool::max_packed_bytes() {
   constexpr std::uint64_t cells = std::uint64_t{kTileEdge + 1} * (kTileEdge + 1) * (kTileEdge + 1);
   // As many sheets as corners and a header for each sheet; an edge has two quads.
-  return cells * (8 * (sizeof(PieceHeader) + sizeof(LabelVertex)) + 6 * sizeof(LabelQuad));
+  return cells * (8 * (sizeof(LabelRecord) + sizeof(LabelVertex)) + 6 * sizeof(LabelQuad));
 }
 
-std::vector<std::byte> LabelSpool::pack(std::span<const LabelPiece> pieces) {
+std::vector<std::byte> LabelSpool::pack(Int3 tile, std::span<const LabelPiece> pieces) {
   std::size_t bytes = 0;
   for (const LabelPiece& piece : pieces)
-    bytes += sizeof(PieceHeader) + piece.vertices.size_bytes() + piece.foreign.size_bytes() +
+    bytes += sizeof(LabelRecord) + piece.vertices.size_bytes() + piece.foreign.size_bytes() +
              piece.quads.size_bytes();
   std::vector<std::byte> packed(bytes);
   std::byte* to = packed.data();
   for (const LabelPiece& piece : pieces) {
-    const PieceHeader header{.label = piece.label,
+    const LabelRecord record{.tile = morton_encode(tile),
+                             .label = piece.label,
                              .vertices = static_cast<std::uint32_t>(piece.vertices.size()),
                              .foreign = static_cast<std::uint32_t>(piece.foreign.size()),
                              .quads = static_cast<std::uint32_t>(piece.quads.size())};
-    to = put(to, std::span(&header, 1));
+    to = put(to, std::span(&record, 1));
     to = put(to, piece.vertices);
     to = put(to, piece.foreign);
     to = put(to, piece.quads);
@@ -63,25 +51,25 @@ std::vector<std::byte> LabelSpool::pack(std::span<const LabelPiece> pieces) {
   return packed;
 }
 
-void LabelSpool::append(Int3 tile, std::span<const std::byte> packed) {
+void LabelSpool::append(std::span<const std::byte> packed) {
   while (!packed.empty()) {
-    PieceHeader header;
-    std::memcpy(&header, packed.data(), sizeof header);
-    const auto items = packed.subspan(sizeof header, header.item_bytes());
-    packed = packed.subspan(sizeof header + items.size());
+    LabelRecord record;
+    std::memcpy(&record, packed.data(), sizeof record);
+    const auto bytes = packed.first(sizeof record + record.item_bytes());
+    packed = packed.subspan(bytes.size());
 
-    const auto [chain, is_new] = chain_of_.insert(label_key(header.label));
+    const Int3 tile = morton_decode(record.tile);
+    const auto [chain, is_new] = chain_of_.insert(label_key(record.label));
     if (is_new)
-      chain = {.label = header.label, .last = kNoPiece, .first_tile = tile, .last_tile = tile};
-    header.previous = chain.last;
-    header.tile = morton_encode(tile);
+      chain = {.label = record.label, .last = kNoPiece, .first_tile = tile, .last_tile = tile};
+    const std::uint64_t previous = chain.last;
     chain.last = writer_.size();
-    chain.vertices += header.vertices;
-    chain.quads += header.quads;
+    chain.vertices += record.vertices;
+    chain.quads += record.quads;
     chain.first_tile = min(chain.first_tile, tile);
     chain.last_tile = max(chain.last_tile, tile);
-    writer_.append(std::as_bytes(std::span(&header, 1)));
-    writer_.append(items);
+    writer_.append(std::as_bytes(std::span(&previous, 1)));
+    writer_.append(bytes);
   }
 }
 
@@ -97,15 +85,19 @@ std::vector<LabelChain> LabelSpool::finish() {
 }
 
 void LabelSpool::read(std::uint64_t place, SpooledPiece& piece) const {
-  PieceHeader header;
-  file_.read_at(place, std::as_writable_bytes(std::span(&header, 1)));
-  std::vector<std::byte> items(header.item_bytes());
-  file_.read_at(place + sizeof header, items);
-  piece.previous = header.previous;
-  piece.tile = morton_decode(header.tile);
-  const std::byte* from = take(items.data(), header.vertices, piece.vertices);
-  from = take(from, header.foreign, piece.foreign);
-  take(from, header.quads, piece.quads);
+  struct {
+    std::uint64_t previous = 0;
+    LabelRecord record;
+  } head;
+  file_.read_at(place, std::as_writable_bytes(std::span(&head, 1)));
+  const LabelRecord& record = head.record;
+  std::vector<std::byte> items(record.item_bytes());
+  file_.read_at(place + sizeof head, items);
+  piece.previous = head.previous;
+  piece.tile = morton_decode(record.tile);
+  const std::byte* from = take(items.data(), record.vertices, piece.vertices);
+  from = take(from, record.foreign, piece.foreign);
+  take(from, record.quads, piece.quads);
 }
 
 }  // namespace isobrick

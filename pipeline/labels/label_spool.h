@@ -39,10 +39,11 @@ class LabelSpool {
   /// The file lies beside `beside`; "-": in the folder of temporary files.
   explicit LabelSpool(const std::string& beside) : writer_(open_scratch_beside(beside)) {}
 
-  /// The pieces of a tile as append() takes them. Thread-safe.
-  static std::vector<std::byte> pack(std::span<const LabelPiece> pieces);
-  /// Appends the pieces of a tile.
-  void append(Int3 tile, std::span<const std::byte> packed);
+  /// The pieces of a tile as append() takes them: a LabelRecord with its items for each.
+  /// Thread-safe.
+  static std::vector<std::byte> pack(Int3 tile, std::span<const LabelPiece> pieces);
+  /// Appends pieces of tiles, which come in Morton order.
+  void append(std::span<const std::byte> packed);
   /// Nothing is appended any more. The labels in ascending order.
   std::vector<LabelChain> finish();
 

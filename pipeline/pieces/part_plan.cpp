@@ -21,11 +21,6 @@ void visit_tiles(const StoreReader& store, const ExtractRequest& request, int le
     f(*work, static_cast<std::uint64_t>(std::popcount(work->active_blocks)));
 }
 
-/// Of `all` blocks, how many lie before the end of the first `number` parts.
-std::uint64_t blocks_before(std::uint64_t all, std::uint64_t number, std::uint64_t count) {
-  return all / count * number + all % count * number / count;
-}
-
 }  // namespace
 
 TileRange PartPlans::tiles(std::uint32_t number) const {
@@ -45,23 +40,14 @@ std::uint32_t PartPlans::part_of(std::uint64_t code) const {
 PartPlans plan_parts(const StoreReader& store, const ExtractRequest& request, int level,
                      std::uint32_t count) {
   PartPlans plans;
-  plans.parts.resize(count);
-  plans.parts.front().begin = 0;
   plans.grid = request.level->lattice.tiles();
   plans.looks_around = request.surface.drop_degenerate || request.surface.cap;
-  std::uint64_t all = 0;
-  visit_tiles(store, request, level, [&](const TileWork& work, std::uint64_t blocks) {
-    all += blocks;
-    for_each_active_block(work, request.surface.roi,
-                          [&](Box3 cells) { plans.bounds = unite(plans.bounds, cells); });
-  });
-  std::uint32_t begun = 1;
-  std::uint64_t before = 0;
-  visit_tiles(store, request, level, [&](const TileWork& work, std::uint64_t blocks) {
-    while (begun < count && before >= blocks_before(all, begun, count))
-      plans.parts[begun++].begin = morton_encode(work.tile);
-    plans.parts[begun - 1].active_blocks += blocks;
-    before += blocks;
+  divide_tiles(plans, count, [&](auto&& f) {
+    visit_tiles(store, request, level, [&](const TileWork& work, std::uint64_t blocks) {
+      for_each_active_block(work, request.surface.roi,
+                            [&](Box3 cells) { plans.bounds = unite(plans.bounds, cells); });
+      f(work, blocks);
+    });
   });
   return plans;
 }

@@ -3,12 +3,14 @@
 #include <cstdint>
 #include <vector>
 
+#include "core/morton.h"
+#include "core/tile.h"
 #include "core/tile_range.h"
 #include "pipeline/extract/extract_plan.h"
 
 namespace isobrick::inline v0 {
 
-/// How the tiles of a surface are divided, in their order, into parts of about as many active
+/// How the tiles of a mesh are divided, in their order, into parts of about as many active
 /// blocks.
 struct PartPlans {
   struct Plan {
@@ -28,11 +30,37 @@ struct PartPlans {
   }
   /// The part that a tile belongs to.
   std::uint32_t part_of(std::uint64_t code) const;
+  /// Of `all` blocks, how many lie before the end of the first `number` parts.
+  static std::uint64_t blocks_before(std::uint64_t all, std::uint64_t number, std::uint64_t count) {
+    return all / count * number + all % count * number / count;
+  }
 };
+
+/// Divides the tiles that `visit` passes to its argument, with a number of blocks each: so many
+/// parts, `plans.parts`, of about as many blocks. `visit(f)` is called twice and calls
+/// f(TileWork, blocks) in the order of the tiles.
+template <class Visit>
+void divide_tiles(PartPlans& plans, std::uint32_t count, Visit&& visit);
 
 /// Plans so many parts. Found from the ranges of the blocks alone, so every task that asks gets the
 /// same.
 PartPlans plan_parts(const StoreReader& store, const ExtractRequest& request, int level,
                      std::uint32_t count);
+
+template <class Visit>
+void divide_tiles(PartPlans& plans, std::uint32_t count, Visit&& visit) {
+  plans.parts.assign(count, {});
+  plans.parts.front().begin = 0;
+  std::uint64_t all = 0;
+  visit([&](const TileWork&, std::uint64_t blocks) { all += blocks; });
+  std::uint32_t begun = 1;
+  std::uint64_t before = 0;
+  visit([&](const TileWork& work, std::uint64_t blocks) {
+    while (begun < count && before >= PartPlans::blocks_before(all, begun, count))
+      plans.parts[begun++].begin = morton_encode(work.tile);
+    plans.parts[begun - 1].active_blocks += blocks;
+    before += blocks;
+  });
+}
 
 }  // namespace isobrick

@@ -23,13 +23,7 @@ Vec3d vector_of(const json& v) {
 }
 
 PieceDescription header_of(const json& object) {
-  PieceDescription header;
-  header.part = {object.at("part").at(0).get<std::uint32_t>(),
-                 object.at("part").at(1).get<std::uint32_t>()};
-  check_part(header.part);
-  header.tiles.begin = object.at("tiles").at(0).get<std::uint64_t>();
-  header.tiles.end = object.at("tiles").at(1).get<std::uint64_t>();
-  header.mesh = object.at("mesh");
+  PieceDescription header{key_of(object), {}};
   MeshHeader& of_mesh = header.of_mesh;
   of_mesh.has_normals = header.mesh.at("normals").get<bool>();
   of_mesh.world_lo = vector_of(object.at("volume").at(0));
@@ -38,14 +32,24 @@ PieceDescription header_of(const json& object) {
     of_mesh.surface = MeshBounds{vector_of(surface.at(0)), vector_of(surface.at(1))};
   of_mesh.unit = object.at("unit").get<std::string>();
   header.isovalue();
-  const Int3 extent = header.extent();
-  if (!(min(extent, {1, 1, 1}) == Int3{1, 1, 1})) throw DamageError("no extent");
   return header;
 }
 
 }  // namespace
 
-Int3 PieceDescription::extent() const {
+PieceKey key_of(const json& object) {
+  PieceKey key;
+  key.part = {object.at("part").at(0).get<std::uint32_t>(),
+              object.at("part").at(1).get<std::uint32_t>()};
+  check_part(key.part);
+  key.tiles.begin = object.at("tiles").at(0).get<std::uint64_t>();
+  key.tiles.end = object.at("tiles").at(1).get<std::uint64_t>();
+  key.mesh = object.at("mesh");
+  if (!(min(key.extent(), {1, 1, 1}) == Int3{1, 1, 1})) throw DamageError("no extent");
+  return key;
+}
+
+Int3 PieceKey::extent() const {
   const json& e = mesh.at("samples").at("extent");
   return {e.at(0).get<Index>(), e.at(1).get<Index>(), e.at(2).get<Index>()};
 }
@@ -55,18 +59,22 @@ double PieceDescription::isovalue() const {
   return value.is_string() ? std::stod(value.get<std::string>()) : value.get<double>();
 }
 
+json to_json(const PieceKey& key) {
+  return {{"part", {key.part.number, key.part.count}},
+          {"tiles", {key.tiles.begin, key.tiles.end}},
+          {"mesh", key.mesh}};
+}
+
 std::uint64_t content_bytes(const PieceTile& tile, bool normals) {
   return mesh_bytes({tile.vertices, tile.triangles}, normals);
 }
 
 std::string to_text(const PieceDescription& header) {
   const MeshHeader& of_mesh = header.of_mesh;
-  json object{{"part", {header.part.number, header.part.count}},
-              {"tiles", {header.tiles.begin, header.tiles.end}},
-              {"mesh", header.mesh},
-              {"volume", {to_json(of_mesh.world_lo), to_json(of_mesh.world_hi)}},
-              {"surface", nullptr},
-              {"unit", of_mesh.unit}};
+  json object = to_json(header);
+  object["volume"] = {to_json(of_mesh.world_lo), to_json(of_mesh.world_hi)};
+  object["surface"] = nullptr;
+  object["unit"] = of_mesh.unit;
   if (of_mesh.surface)
     object["surface"] = {to_json(of_mesh.surface->lo), to_json(of_mesh.surface->hi)};
   return object.dump();

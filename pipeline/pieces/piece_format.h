@@ -15,21 +15,32 @@
 
 namespace isobrick::inline v0 {
 
-/// What a piece begins with.
-struct PieceDescription {
+/// What pieces of surfaces and of labels are told apart by.
+struct PieceKey {
   Part part;
   TileRange tiles;      ///< whose mesh it holds
   nlohmann::json mesh;  ///< whose part it is: samples and options
-  MeshHeader of_mesh;   ///< of the whole mesh
 
   Int3 extent() const;  ///< samples of the volume
+};
+
+/// What a piece of a surface begins with.
+struct PieceDescription : PieceKey {
+  MeshHeader of_mesh;  ///< of the whole mesh
+
   double isovalue() const;
 };
 
+/// What a piece is one of.
+enum class PieceKind { surface, labels };
+
 /// Before the header's text.
 struct PieceStart {
-  static constexpr std::uint64_t kMagic = 0x65636569706f7369;  // "isopiece"
+  static constexpr std::uint64_t kMagic = 0x65636569706f7369;        // "isopiece"
+  static constexpr std::uint64_t kLabelsMagic = 0x6c6562616c6f7369;  // "isolabel"
   static constexpr std::uint32_t kVersion = 1;
+  /// Longer descriptions are none of ours; those of labels have names.
+  static constexpr std::uint32_t kMaxHeader = std::uint32_t{64} << 20;
   std::uint64_t magic = kMagic;
   std::uint32_t version = kVersion;
   std::uint32_t header_bytes = 0;
@@ -43,7 +54,8 @@ struct PieceTile {
   std::uint32_t triangles = 0;
 };
 
-/// What a piece ends with.
+/// What a piece ends with. Of labels, `tiles` counts what tiles have of one label each, and
+/// `neighbours` and `degenerate` are 0.
 struct PieceEnd {
   static constexpr std::uint64_t kMagic = 0x646e656563656970;  // "pieceend"
   std::uint64_t neighbours = 0;  ///< tiles before the part that are listed
@@ -66,6 +78,11 @@ inline constexpr std::uint32_t kMaxTileTriangles = 1 << 20;
 
 /// Bytes of a tile behind its PieceTile.
 std::uint64_t content_bytes(const PieceTile& tile, bool normals);
+
+/// As members of a description, and back. Throws nlohmann::json::exception or Error for what is no
+/// key.
+nlohmann::json to_json(const PieceKey& key);
+PieceKey key_of(const nlohmann::json& object);
 
 /// The text of a header: one for each header.
 std::string to_text(const PieceDescription& header);

@@ -3,19 +3,14 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <map>
-#include <mutex>
 #include <random>
 #include <set>
 #include <utility>
 
-#include <isobrick/convert.h>
 #include <isobrick/error.h>
-#include <isobrick/mesh_sinks.h>
-#include "tests/pipeline/convert_doubles.h"
+#include "tests/pipeline/labels_fixture.h"
 #include "tests/pipeline/least_budget.h"
 #include "tests/surface/mesh_topology.h"
-#include "tests/temporary_folder.h"
 
 namespace isobrick::test {
 namespace {
@@ -23,73 +18,6 @@ namespace {
 using isobrick::testing::Field;
 using isobrick::testing::Mesh;
 using Meshes = std::map<std::int64_t, Mesh>;
-
-/// Stores of label images.
-class Labels : public ::testing::Test {
- protected:
-  template <class T>
-  StoreReader store(const Field<T>& field, Index brick = 64,
-                    const Transform& transform = Transform()) {
-    MemorySource source(field.extent, scalar_type_of<T>, as_bytes(field.samples));
-    source.mutable_info().transform = transform;
-    const auto path = folder_ / ("s" + std::to_string(next_++) + ".zarr");
-    convert(source, path, {.brick = brick, .downsampling = Downsampling::mode});
-    return StoreReader(path);
-  }
-
-  /// Of a store, or of a Volume.
-  template <class Samples>
-  static Meshes meshes_of(const Samples& store, const LabelOptions& options = {},
-                          LabelReport* report = nullptr) {
-    Meshes meshes;
-    std::mutex mutex;
-    const LabelReport made = extract_labels(store, options, [&](const LabelMesh& label) {
-      isobrick::Mesh mesh;
-      MemorySink sink(mesh);
-      label.write(sink);
-      EXPECT_EQ(mesh.positions.size(), label.size().vertices);
-      EXPECT_EQ(mesh.triangles.size(), label.size().triangles);
-      const std::lock_guard lock(mutex);
-      const bool is_new = meshes
-                              .insert({label.label(),
-                                       {{mesh.positions.begin(), mesh.positions.end()},
-                                        {},
-                                        {mesh.triangles.begin(), mesh.triangles.end()}}})
-                              .second;
-      EXPECT_TRUE(is_new) << label.label();
-    });
-    EXPECT_EQ(made.labels, meshes.size());
-    if (report) *report = made;
-    return meshes;
-  }
-
-  static Meshes meshes_of_all(const StoreReader& store, LabelOptions options = {}) {
-    options.labels = {{-1000000, 1000000}};
-    return meshes_of(store, options);
-  }
-
-  TemporaryFolder folder_;
-  int next_ = 0;
-};
-
-/// Cells around random points, with background beyond a ball.
-template <class T>
-Field<T> cells(Int3 extent, int count, unsigned seed) {
-  std::mt19937 random(seed);
-  const auto below = [&](Index n) { return static_cast<Index>(random()) % n; };
-  std::vector<Int3> points;
-  for (int i = 0; i < count; ++i)
-    points.push_back({below(extent.x), below(extent.y), below(extent.z)});
-  return Field<T>(extent, [&](Int3 p) -> double {
-    const Int3 from_middle = p * 2 - extent;
-    if (dot(from_middle, from_middle) > extent.x * extent.x) return 0;
-    std::size_t nearest = 0;
-    for (std::size_t i = 1; i < points.size(); ++i)
-      if (dot(p - points[i], p - points[i]) < dot(p - points[nearest], p - points[nearest]))
-        nearest = i;
-    return static_cast<double>(nearest + 1);
-  });
-}
 
 template <class T>
 Field<T> noise(Int3 extent, unsigned labels, unsigned seed) {
