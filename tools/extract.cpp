@@ -207,22 +207,9 @@ void check_devices(const ExtractArguments& arguments) {
   check_piece_arguments(arguments, "several devices");
 }
 
-/// Opens the input. The first rank of a job adds what a store lacks before the others open it.
-OpenedVolume open_shared_input(const ExtractArguments& arguments, Ranks* job, Console& console) {
-  const auto open = [&] {
-    return open_input(arguments.input, arguments.memory, arguments.threads, console);
-  };
-  if (job == nullptr) return open();
-  // A conversion of each rank would cost more than the surface.
-  check_store(arguments.input.path);
-  if (job->rank() > 0) job->wait_for_all();
-  OpenedVolume input = open();
-  if (job->rank() == 0) job->wait_for_all();
-  return input;
-}
-
 int run_extract(const ExtractArguments& given, Console& console) {
-  if (given.part) return run_extract_part(given, console);
+  if (given.part)
+    return given.labels ? run_extract_label_part(given, console) : run_extract_part(given, console);
   if (given.labels) return run_extract_labels(given, console);
   ExtractArguments arguments = with_preset(given);
   Ranks* const job = arguments.estimate ? nullptr : join_job(arguments.mpi, console);
@@ -273,12 +260,6 @@ int run_extract(const ExtractArguments& given, Console& console) {
 std::optional<int> parse_level(const std::string& text) {
   if (text == "auto") return std::nullopt;
   return parse_int(text, 0, 64);
-}
-
-bool parse_normals(const std::string& text) {
-  if (text == "gradient") return true;
-  if (text == "none") return false;
-  throw UsageError(fmt::format("'{}' is no kind of normals; it is gradient or none", text));
 }
 
 std::vector<int> parse_devices(const std::string& text) {
@@ -354,6 +335,21 @@ void add_outputs(CLI::App* app, ExtractArguments& arguments) {
 }
 
 }  // namespace
+
+OpenedVolume open_shared_input(const ExtractArguments& arguments, Ranks* job, Console& console,
+                               std::optional<Downsampling> downsampling) {
+  const auto open = [&] {
+    return open_input(arguments.input, arguments.memory, arguments.threads, console, true,
+                      downsampling);
+  };
+  if (job == nullptr) return open();
+  // A conversion of each rank would cost more than the surface.
+  check_store(arguments.input.path);
+  if (job->rank() > 0) job->wait_for_all();
+  OpenedVolume input = open();
+  if (job->rank() == 0) job->wait_for_all();
+  return input;
+}
 
 void add_extract(Program& program) {
   auto arguments = std::make_shared<ExtractArguments>();

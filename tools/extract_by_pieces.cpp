@@ -36,22 +36,10 @@ constexpr std::uint64_t kBlocksOfSharedPiece = std::uint64_t{1} << 22;
 constexpr std::uint64_t kPiecesOfRank = 4;
 constexpr std::uint64_t kFewestBlocks = 256;
 
-/// Without ranks by the surface alone, so that the next run finds the same parts.
 std::uint32_t count_parts(const StoreReader& store, ExtractOptions options, const Ranks* job) {
   options.index = {.automatic = false, .kind = {}};
-  const std::uint64_t blocks = count_active(store, options).active_blocks;
-  const auto pieces = [&](std::uint64_t size) {
-    return std::max<std::uint64_t>(1, (blocks + size - 1) / size);
-  };
-  const bool on_device = options.backend == Backend::cuda;
-  const auto ranks = static_cast<std::uint64_t>(job != nullptr ? job->size() : 0);
-  const std::uint64_t size = !on_device       ? kBlocksOfPiece
-                             : job == nullptr ? kBlocksOfPieceOnDevice
-                                              : kBlocksOfSharedPiece;
-  const std::uint64_t for_ranks = ranks * (on_device ? 1 : kPiecesOfRank);
-  return static_cast<std::uint32_t>(
-      std::max(std::min(pieces(size), kMaxPieces),
-               std::min({for_ranks, pieces(kFewestBlocks), std::uint64_t{kMaxParts}})));
+  return count_pieces(count_active(store, options).active_blocks, job,
+                      options.backend == Backend::cuda);
 }
 
 /// What pieces took, as numbers that ranks can add up.
@@ -173,9 +161,7 @@ class PieceWork {
   MadePieces in_files() {
     made_.folder = surface_.output;
     made_.folder += ".pieces";
-    std::error_code failure;
-    fs::create_directory(made_.folder, failure);
-    if (failure) throw system_error("create", made_.folder.string(), failure.value());
+    create_piece_folder(made_.folder);
     for (std::uint32_t i = 1; i <= made_.total; ++i)
       made_.paths.push_back(made_.folder /
                             fmt::format("{}of{}{}", i, made_.total, kPieceExtension));
@@ -243,15 +229,6 @@ bool is_own_piece(const fs::path& path) {
   return std::regex_match(path.filename().string(), name);
 }
 
-/// The folder goes if nobody put anything else into it.
-void remove_pieces(const MadePieces& pieces) {
-  if (pieces.folder.empty()) return;
-  std::error_code ignored;
-  for (const auto& entry : fs::directory_iterator(pieces.folder, ignored))
-    if (is_own_piece(entry.path())) fs::remove(entry.path(), ignored);
-  fs::remove(pieces.folder, ignored);
-}
-
 /// What became of the pieces of a surface.
 MergeResult put_together(const ExtractArguments& arguments, const ExtractedSurface& surface,
                          const PieceMaker& maker, MadePieces& pieces, Ranks* job,
@@ -282,7 +259,7 @@ MergeResult put_together(const ExtractArguments& arguments, const ExtractedSurfa
                   .no_space_check = arguments.no_space_check},
                  console);
   }
-  if (job == nullptr || job->rank() == 0) remove_pieces(pieces);
+  if (job == nullptr || job->rank() == 0) remove_piece_folder(pieces.folder);
   if (job != nullptr) job->wait_for_all();
   return made;
 }
@@ -303,6 +280,34 @@ void check_outputs_of(const ExtractArguments& arguments,
 }
 
 }  // namespace
+
+std::uint32_t count_pieces(std::uint64_t active_blocks, const Ranks* job, bool on_device) {
+  const auto pieces = [&](std::uint64_t size) {
+    return std::max<std::uint64_t>(1, (active_blocks + size - 1) / size);
+  };
+  const auto ranks = static_cast<std::uint64_t>(job != nullptr ? job->size() : 0);
+  const std::uint64_t size = !on_device       ? kBlocksOfPiece
+                             : job == nullptr ? kBlocksOfPieceOnDevice
+                                              : kBlocksOfSharedPiece;
+  const std::uint64_t for_ranks = ranks * (on_device ? 1 : kPiecesOfRank);
+  return static_cast<std::uint32_t>(
+      std::max(std::min(pieces(size), kMaxPieces),
+               std::min({for_ranks, pieces(kFewestBlocks), std::uint64_t{kMaxParts}})));
+}
+
+void create_piece_folder(const fs::path& folder) {
+  std::error_code failure;
+  fs::create_directory(folder, failure);
+  if (failure) throw system_error("create", folder.string(), failure.value());
+}
+
+void remove_piece_folder(const fs::path& folder) {
+  if (folder.empty()) return;
+  std::error_code ignored;
+  for (const auto& entry : fs::directory_iterator(folder, ignored))
+    if (is_own_piece(entry.path())) fs::remove(entry.path(), ignored);
+  fs::remove(folder, ignored);
+}
 
 void check_piece_arguments(const ExtractArguments& arguments, std::string_view reason) {
   if (!arguments.preview.path.empty())

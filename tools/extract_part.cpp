@@ -20,39 +20,6 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::ordered_json;
 
-/// Refuses options of what only the whole mesh becomes.
-void check_part_arguments(const ExtractArguments& arguments) {
-  const std::pair<bool, const char*> of_merge[] = {
-      {filter_options(arguments.filters).any(), "a filter, --measure or --mesh-unit"},
-      {!arguments.attributes.empty(), "--attribute"},
-      {arguments.format.has_value(), "--format"},
-      {arguments.quantize, "--quantize"},
-      {arguments.levels > 0, "--levels"},
-      {arguments.sharded, "--sharded"},
-      {arguments.for_print, "--preset"}};
-  for (const auto& [is_given, name] : of_merge)
-    if (is_given)
-      throw UsageError(
-          fmt::format("--part: {} is for the whole mesh: give it to 'isobrick merge'", name));
-  const std::pair<bool, const char*> others[] = {{arguments.labels.has_value(), "--labels"},
-                                                 {!arguments.preview.path.empty(), "--preview"},
-                                                 {arguments.estimate, "--estimate"},
-                                                 {arguments.devices.size() > 1, "a second device"}};
-  for (const auto& [is_given, name] : others)
-    if (is_given) throw UsageError(fmt::format("--part: {} is not for parts: leave it out", name));
-  refuse_url_output(arguments.output);
-  if (is_standard_output(arguments.output))
-    throw UsageError("--part: a piece is a file, which is found again: name it with -o");
-  refuse_misleading_name(
-      arguments.output, std::span(&kPieceExtension, 1),
-      "--part makes a piece: name it .piece, and 'isobrick merge' makes the mesh");
-  // A conversion of each task would cost more than the surface.
-  if (!is_zarr(arguments.input.path))
-    throw UsageError(
-        fmt::format("--part: '{}' is no store: make one for all tasks with 'isobrick convert'",
-                    arguments.input.path));
-}
-
 /// The piece of a surface: "head_500_3of8.piece" where no name is given.
 fs::path piece_name(const ExtractArguments& arguments, double isovalue) {
   if (!arguments.output.empty())
@@ -96,6 +63,40 @@ std::string piece_text(const ExtractedSurface& surface, const PieceReport& repor
 }
 
 }  // namespace
+
+void check_part_arguments(const ExtractArguments& arguments) {
+  FilterArguments filters = arguments.filters;
+  if (arguments.labels) filters.smooth = 0;  // all meshes are smoothed together, in their pieces
+  const std::pair<bool, const char*> of_merge[] = {
+      {filter_options(filters).any(), "a filter, --measure or --mesh-unit"},
+      {!arguments.attributes.empty(), "--attribute"},
+      {arguments.format.has_value(), "--format"},
+      {arguments.quantize, "--quantize"},
+      {arguments.levels > 0, "--levels"},
+      {arguments.sharded, "--sharded"},
+      {arguments.labels && arguments.normals, "--normals"},
+      {arguments.for_print, "--preset"}};
+  for (const auto& [is_given, name] : of_merge)
+    if (is_given)
+      throw UsageError(
+          fmt::format("--part: {} is for the whole mesh: give it to 'isobrick merge'", name));
+  const std::pair<bool, const char*> others[] = {{!arguments.preview.path.empty(), "--preview"},
+                                                 {arguments.estimate, "--estimate"},
+                                                 {arguments.devices.size() > 1, "a second device"}};
+  for (const auto& [is_given, name] : others)
+    if (is_given) throw UsageError(fmt::format("--part: {} is not for parts: leave it out", name));
+  refuse_url_output(arguments.output);
+  if (is_standard_output(arguments.output))
+    throw UsageError("--part: a piece is a file, which is found again: name it with -o");
+  refuse_misleading_name(
+      arguments.output, std::span(&kPieceExtension, 1),
+      "--part makes a piece: name it .piece, and 'isobrick merge' makes the mesh");
+  // A conversion of each task would cost more than the surface.
+  if (!is_zarr(arguments.input.path))
+    throw UsageError(
+        fmt::format("--part: '{}' is no store: make one for all tasks with 'isobrick convert'",
+                    arguments.input.path));
+}
 
 int run_extract_part(const ExtractArguments& given, Console& console) {
   check_part_arguments(given);

@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include <isobrick/error.h>
+#include <isobrick/label_pieces.h>
 #include "core/stopwatch.h"
 #include "io/bytes/folder_walk.h"
 #include "io/bytes/leftovers.h"
@@ -13,6 +14,7 @@
 #include "io/meshes/levels/level_sink.h"
 #include "tools/extract_report.h"
 #include "tools/format.h"
+#include "tools/label_writer.h"
 #include "tools/measure_report.h"
 #include "tools/mesh_space.h"
 #include "tools/output_name.h"
@@ -31,17 +33,22 @@ struct MergeArguments {
   int levels = 0;
   bool sharded = false;
   FilterArguments filters;
+  bool normals = true;
   std::vector<AttributeRequest> attributes;
   std::uint64_t memory = 0;
   int threads = 0;
   bool force = false, no_space_check = false;
 };
 
+/// "head_500" of "head_500_3of8.piece".
+std::string stem_of_piece(const std::string& piece) {
+  const std::string stem = fs::path(piece).stem().string();
+  return std::regex_replace(stem, std::regex("_[0-9]+of[0-9]+$"), "");
+}
+
 /// "head_500.ply" of "head_500_3of8.piece", in the current folder.
 fs::path default_output(const std::string& piece, MeshFormat format) {
-  const std::string stem = fs::path(piece).stem().string();
-  return std::regex_replace(stem, std::regex("_[0-9]+of[0-9]+$"), "") +
-         std::string(isobrick::extension_of(format));
+  return stem_of_piece(piece) + std::string(isobrick::extension_of(format));
 }
 
 MeshForm form_of(const MergeArguments& arguments) {
@@ -144,13 +151,68 @@ std::string merge_text(const MergeJob& job, const MergeResult& made) {
   return text + fmt::format("  {} ({})\n", job.output.string(), human_bytes(made.bytes));
 }
 
+/// Pieces of labels become a folder.
+int run_merge_labels(const MergeArguments& arguments, Console& console) {
+  if (!arguments.attributes.empty())
+    throw UsageError(
+        "--attribute is for isosurfaces, and these are pieces of labels: leave it out");
+  if (arguments.filters.smooth > 0)
+    throw UsageError(
+        "meshes of labels are smoothed together, in their pieces: give --smooth to 'isobrick "
+        "extract --part'");
+  LabelOutput output{.folder = arguments.output.empty() ? stem_of_piece(arguments.pieces.front())
+                                                        : arguments.output,
+                     .format = arguments.format,
+                     .quantize = arguments.quantize,
+                     .levels = arguments.levels,
+                     .sharded = arguments.sharded,
+                     .normals = arguments.normals,
+                     .filters = arguments.filters,
+                     .memory = arguments.memory,
+                     .threads = arguments.threads,
+                     .force = arguments.force};
+  check_label_output(output);
+  if (!arguments.output.empty()) check_label_folder(output);
+  const std::vector<fs::path> pieces(arguments.pieces.begin(), arguments.pieces.end());
+  const LabelPiecesInfo info = read_label_pieces(pieces);
+  check_replaces_no_input(output.folder, pieces);
+  const WrittenLabels written =
+      write_labels(output, {info.name, info.level, info.labels},
+                   [&](int visits, const fs::path& folder, const LabelVisitor& visit) {
+                     return merge_label_pieces(pieces,
+                                               {.memory = arguments.memory,
+                                                .threads = arguments.threads,
+                                                .visits = visits,
+                                                .scratch_beside = folder},
+                                               visit, console.progress());
+                   });
+  const LabelReport& report = written.report;
+  console.result(
+      {{"command", "merge"},
+       {"pieces", pieces.size()},
+       {"output", output.folder},
+       {"output_bytes", written.bytes},
+       {"labels", report.labels},
+       {"triangles", written.size.triangles},
+       {"vertices", written.size.vertices},
+       {"scratch_bytes", report.scratch_bytes},
+       {"seconds", {{"total", report.seconds}, {"write", report.write_seconds}}},
+       {"peak_resident_bytes", peak_resident_bytes()}},
+      fmt::format("{} of {} {} in {}\n  {} ({})\n", sizes_text(written), human_count(pieces.size()),
+                  pieces.size() == 1 ? "piece" : "pieces", human_seconds(report.seconds),
+                  output.folder, human_bytes(written.bytes)));
+  return 0;
+}
+
 int run_merge(const MergeArguments& arguments, Console& console) {
+  if (is_label_piece(arguments.pieces.front())) return run_merge_labels(arguments, console);
   refuse_url_output(arguments.output);
   MergeJob job{.form = form_of(arguments),
                .filter = filter_options(arguments.filters),
                .attributes = arguments.attributes,
                .memory = arguments.memory,
                .threads = arguments.threads,
+               .normals = arguments.normals,
                .force = arguments.force,
                .no_space_check = arguments.no_space_check};
   check_filters(arguments.filters, false);
@@ -170,7 +232,7 @@ int run_merge(const MergeArguments& arguments, Console& console) {
 
 MergeResult merge(MergeJob job, Console& console) {
   MergeResult made{.pieces = read_pieces(job.pieces)};
-  job.form.normals = made.pieces.header.has_normals && has_normals(job.form.format);
+  job.form.normals = made.pieces.header.has_normals && has_normals(job.form.format) && job.normals;
   std::vector<fs::path> inputs = paths_of(job.attributes);
   inputs.insert(inputs.end(), job.pieces.begin(), job.pieces.end());
   check_replaces_no_input(job.output, inputs);
@@ -207,7 +269,7 @@ void add_merge(Program& program) {
   add_paths(app, "PIECES", arguments->pieces, "All pieces of the mesh, in any order");
   add_output(app, arguments->output, "MESH",
              "Mesh to write, .ply, .stl, .obj, .glb, .vtp, .pvtp, .neuroglancer or .3dtiles; - for "
-             "standard output",
+             "standard output; of labels a folder",
              "head_500.ply of head_500_1of8.piece, in the current folder");
   add_parsed(app, arguments->format,
              [](const std::string& text) { return std::optional(parse_mesh_format(text)); },
@@ -219,6 +281,9 @@ void add_merge(Program& program) {
              {"--levels", "auto|N",
               "Levels of detail of neuroglancer's format and 3D Tiles at most", "auto"});
   add_flag(app, "--sharded", arguments->sharded, "neuroglancer's format in few large files");
+  add_parsed(
+      app, arguments->normals, parse_normals,
+      {"--normals", "gradient|none", "none: without those that the pieces have", "gradient"});
   add_filters(app, arguments->filters);
   add_attributes(app, arguments->attributes);
   add_memory(app, arguments->memory);

@@ -23,6 +23,7 @@ struct MergeJob {
   std::vector<AttributeRequest> attributes;
   std::uint64_t memory = 0;
   int threads = 0;
+  bool normals = true;  ///< false: without those that the pieces have
   bool force = false, no_space_check = false;
 };
 

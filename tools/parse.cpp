@@ -151,6 +151,12 @@ Part parse_part(std::string_view text) {
   return part;
 }
 
+bool parse_normals(const std::string& text) {
+  if (text == "gradient") return true;
+  if (text == "none") return false;
+  throw UsageError(fmt::format("'{}' is no kind of normals; it is gradient or none", text));
+}
+
 Vec3f parse_colour(std::string_view text) {
   constexpr std::string_view digits = "0123456789abcdef";
   if (text == "white") return {1, 1, 1};

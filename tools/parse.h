@@ -73,6 +73,9 @@ Inside parse_inside(std::string_view text);
 /// "consistent" or "trilinear".
 Topology parse_topology(std::string_view text);
 
+/// "gradient" (true) or "none".
+bool parse_normals(const std::string& text);
+
 /// "#RRGGBB", "white" or "black": sRGB in [0, 1].
 Vec3f parse_colour(std::string_view text);
 

@@ -67,7 +67,7 @@ const std::map<std::string, Names> kPublicHeaders = {
     {"pipeline/recode", {"recode"}},
     {"pipeline/extract", {"estimate", "extract", "index_choice"}},
     {"pipeline/index", {"index_build"}},
-    {"pipeline/labels", {"labels"}},
+    {"pipeline/labels", {"label_pieces", "labels"}},
     {"pipeline/pieces", {"pieces"}},
     {"pipeline/sample", {"attributes"}},
     {"pipeline/upload", {"upload"}},

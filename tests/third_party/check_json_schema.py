@@ -122,6 +122,12 @@ def run_commands(check):
     check.run("extract_labels", "extract", "cells.zarr", "--labels", "all", "-o", "meshes",
               "--measure")
     check.validate("label_list", (folder / "meshes" / "labels.json").read_text(), "labels.json")
+    check.run("extract_labels", "extract", "cells.zarr", "--labels", "all", "-o", "resumed",
+              "--resume")
+    for _ in range(2):
+        check.run("extract_label_part", "extract", "cells.zarr", "--labels", "all", "--part", "1/1",
+                  "-o", "l.piece")
+    check.run("merge_labels", "merge", "l.piece", "-o", "merged")
     for command in (["man"], ["completion", "bash"], ["help", "info"]):
         check.run("text", *command)
     if "not in this program" not in subprocess.run([check.isobrick, "help", "view"], text=True,

@@ -131,6 +131,42 @@ TEST_F(Mpi, SeveralIsovaluesAreSeveralMeshes) {
                 read_file(path(fmt::format("one_{}.ply", isovalue))));
 }
 
+TEST_F(Mpi, LabelsAreTheFolderOfOneProcess) {
+  run_json(
+      {"synth", "cells", path("c.zarr"), "--dims", "150,130,90", "--type", "u16", "--brick", "32"});
+  for (const Arguments& more :
+       {Arguments{}, {"--smooth", "2", "--simplify", "30%", "--format", "stl"}}) {
+    const auto words = [&](const std::string& folder) {
+      Arguments all{"extract", path("c.zarr"), "--labels", "all", "-o", path(folder)};
+      all.insert(all.end(), more.begin(), more.end());
+      return all;
+    };
+    const auto one = run_json(words("one"));
+    const auto made = mpirun_json(3, words("ranks"));
+    EXPECT_EQ(made["ranks"]["total"], 3);
+    EXPECT_GE(made["pieces"]["total"], 3);
+    for (const std::string member : {"labels", "triangles", "vertices", "output_bytes"})
+      EXPECT_EQ(made[member], one[member]) << member;
+    std::size_t compared = 0;
+    for (const auto& entry : fs::directory_iterator(path("one"))) {
+      ++compared;
+      EXPECT_TRUE(read_file(entry.path()) == read_file(path("ranks") / entry.path().filename()))
+          << entry.path();
+    }
+    EXPECT_GT(compared, 20u);
+    EXPECT_EQ(files(), (std::vector<std::string>{"c.zarr", "g.zarr", "one", "ranks"}));
+    fs::remove_all(path("one"));
+    fs::remove_all(path("ranks"));
+  }
+  // One line, of the first rank that fails.
+  const Outcome refused =
+      mpirun(2, {"extract", path("c.zarr"), "--labels", "60000", "-o", path("never")});
+  EXPECT_NE(refused.exit_code, 0);
+  EXPECT_NE(refused.err.find("has no label 60000"), std::string::npos) << refused.err;
+  EXPECT_EQ(own_lines(refused.err).size(), 1u) << refused.err;
+  EXPECT_FALSE(fs::exists(path("never")));
+}
+
 TEST_F(Mpi, ConvertMakesTheStoreOfOneProcess) {
   // Two units, of 512 samples along x.
   write_file(path("v.raw"), noise(std::size_t{600} * 20 * 20));
