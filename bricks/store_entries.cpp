@@ -24,7 +24,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::array<std::string_view, 4> kKinds{"interval", "kdtree", "quadtree", "octree"};
+constexpr std::array<std::string_view, 5> kKinds{"interval", "kdtree", "quadtree", "octree",
+                                                 kLabelIndex};
 constexpr std::array<std::string_view, 3> kItems{"range", "block_range", "brick_crc32c"};
 constexpr std::string_view kHistogram = "histogram";
 constexpr Index kAnyNumber = std::numeric_limits<Index>::max();

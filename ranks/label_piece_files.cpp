@@ -14,7 +14,7 @@ namespace {
 /// What pieces took, as numbers that ranks can add up.
 struct LabelSums {
   std::uint64_t kept = 0, vertices = 0, triangles = 0;
-  std::uint64_t bricks_read = 0, brick_reads = 0, bytes_read = 0;
+  std::uint64_t bricks_read = 0, brick_reads = 0, bytes_read = 0, index_bytes = 0;
 
   void add(const LabelSums& other) {
     kept += other.kept;
@@ -23,16 +23,18 @@ struct LabelSums {
     bricks_read += other.bricks_read;
     brick_reads += other.brick_reads;
     bytes_read += other.bytes_read;
+    index_bytes += other.index_bytes;
   }
 };
 
 LabelSums sums_of(const LabelPieceReport& piece) {
-  return {piece.is_kept ? std::uint64_t{1} : 0,
-          piece.pass.vertices,
-          piece.pass.triangles,
-          piece.pass.bricks_read,
-          piece.pass.brick_reads,
-          piece.pass.bytes_read};
+  return {.kept = piece.is_kept ? std::uint64_t{1} : 0,
+          .vertices = piece.pass.vertices,
+          .triangles = piece.pass.triangles,
+          .bricks_read = piece.pass.bricks_read,
+          .brick_reads = piece.pass.brick_reads,
+          .bytes_read = piece.pass.bytes_read,
+          .index_bytes = piece.pass.index_bytes};
 }
 
 }  // namespace
@@ -67,6 +69,7 @@ LabelPieceFiles make_label_pieces(Ranks* ranks, const StoreReader& store,
   files.pass.bricks_read = std::min(sums.bricks_read, files.pass.bricks);  // some for several
   files.pass.brick_reads = sums.brick_reads;
   files.pass.bytes_read = sums.bytes_read;
+  files.pass.index_bytes = sums.index_bytes;
   return files;
 }
 

@@ -58,9 +58,9 @@ IndexView open_index_part(std::span<const std::byte> bytes, IndexKind kind, Scal
   return index;
 }
 
-std::string index_brick_name(int level, IndexKind kind, Int3 brick) {
-  return fmt::format("level {}, {} index, index brick ({}, {}, {})", level, name_of(kind), brick.x,
-                     brick.y, brick.z);
+std::string index_brick_name(int level, std::string_view kind, Int3 brick) {
+  return fmt::format("level {}, {} index, index brick ({}, {}, {})", level, kind, brick.x, brick.y,
+                     brick.z);
 }
 
 std::uint64_t marked_blocks(std::span<const std::uint64_t> words, Int3 grid, Index leaf) {
@@ -128,14 +128,14 @@ std::uint64_t IndexSearch::active_blocks(const IndexChunk& chunk, Int3 brick,
                       "isovalue is in its range",
                       chunk.name()));
   } catch (const DamageError& e) {
-    throw DamageError(index_brick_name(level_, kind_, brick) + ": " + e.what());
+    throw DamageError(index_brick_name(level_, name_of(kind_), brick) + ": " + e.what());
   }
   try {
     const IndexView index = open_index_part(bytes, kind_, layout.type, grid);
     return with_cell_less_blocks(marked_blocks(marks(index, isovalue), grid, layout.leaf), brick);
   } catch (const DamageError& e) {
-    throw DamageError(index_brick_name(level_, kind_, brick) + ": " + chunk.where(part) + ": " +
-                      e.what());
+    throw DamageError(index_brick_name(level_, name_of(kind_), brick) + ": " + chunk.where(part) +
+                      ": " + e.what());
   }
 }
 

@@ -18,7 +18,7 @@ IndexView open_index_part(std::span<const std::byte> bytes, IndexKind kind, Scal
                           Int3 grid);
 
 /// How messages name the part of an index brick.
-std::string index_brick_name(int level, IndexKind kind, Int3 brick);
+std::string index_brick_name(int level, std::string_view kind, Int3 brick);
 
 /// The blocks of 16³ cells of an index brick (bit x + 4·y + 16·z) that hold an
 /// item with its bit set in `words`; the items are blocks of leaf³ cells, C order

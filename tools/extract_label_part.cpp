@@ -43,6 +43,7 @@ ordered_json label_piece_json(const ExtractArguments& arguments, const fs::path&
           {"bricks", {{"total", report.pass.bricks}, {"read", report.pass.bricks_read}}},
           {"brick_reads", report.pass.brick_reads},
           {"bytes_read", report.pass.bytes_read},
+          {"index_bytes", report.pass.index_bytes},
           {"seconds", report.pass.seconds},
           {"kept", report.is_kept},
           {"peak_resident_bytes", peak_resident_bytes()}};
@@ -117,6 +118,7 @@ LabelsByPieces make_labels_by_pieces(const LabelOutput& output, const LabelListi
   report.bricks_read = pieces.pass.bricks_read;
   report.brick_reads = pieces.pass.brick_reads;
   report.bytes_read = pieces.pass.bytes_read;
+  report.index_bytes = pieces.pass.index_bytes;
   report.seconds = seconds;
   made.total = pieces.paths.size();
   made.kept = pieces.kept;

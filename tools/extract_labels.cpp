@@ -64,6 +64,7 @@ ordered_json report_json(const ExtractArguments& arguments, const LabelOutput& o
           {"bricks", {{"total", report.bricks}, {"read", report.bricks_read}}},
           {"brick_reads", report.brick_reads},
           {"bytes_read", report.bytes_read},
+          {"index_bytes", report.index_bytes},
           {"scratch_bytes", report.scratch_bytes},
           {"seconds", {{"total", report.seconds}, {"write", report.write_seconds}}}};
 }
@@ -105,6 +106,7 @@ void check_label_arguments(const ExtractArguments& arguments) {
       {arguments.topology != Topology::consistent, "--topology"},
       {arguments.inside.has_value(), "--inside"},
       {arguments.normals == std::optional(true), "--normals"},
+      {arguments.search.kind.has_value(), "--search with a kind"},
       {arguments.max_triangles || !arguments.level, "--max-triangles"},
       {arguments.backend == Backend::cuda, "--backend cuda"}};
   for (const auto& [is_given, name] : of_isosurfaces)
@@ -121,7 +123,8 @@ LabelOptions label_options(const ExtractArguments& arguments, const StoreReader&
                        .smooth = arguments.filters.smooth,
                        .pass_band = arguments.filters.pass_band.value_or(0.1),
                        .memory = arguments.memory,
-                       .threads = arguments.threads};
+                       .threads = arguments.threads,
+                       .use_lists = arguments.search.automatic};
   options.roi = store_region(store, options.level, arguments.region);
   return options;
 }

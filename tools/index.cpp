@@ -5,8 +5,11 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include <isobrick/error.h>
 #include <isobrick/index_build.h>
+#include <isobrick/label_index.h>
 #include <isobrick/store_reader.h>
+#include "bricks/ranges/index_layout.h"
 #include "core/stopwatch.h"
 #include "tools/format.h"
 #include "tools/index_options.h"
@@ -20,7 +23,8 @@ namespace {
 struct IndexArguments {
   std::string store;
   IndexOptions index;
-  bool mpi = true;  ///< the ranks of a job share the work
+  bool has_labels = false;  ///< lists of labels in place of index.kind
+  bool mpi = true;          ///< the ranks of a job share the work
 };
 
 /// Samples of a part that ranks share. By the volume alone, so that the next run finds the same
@@ -32,6 +36,14 @@ std::uint64_t total(const IndexReport& report) {
   std::uint64_t bytes = 0;
   for (const std::uint64_t of_level : report.level_bytes) bytes += of_level;
   return bytes;
+}
+
+std::string kind_of(const IndexArguments& arguments) {
+  return std::string(arguments.has_labels ? kLabelIndex : name_of(arguments.index.kind));
+}
+
+Index leaf_of(const IndexArguments& arguments) {
+  return arguments.has_labels ? kLabelLeaf : arguments.index.leaf;
 }
 
 std::string text_of(const IndexArguments& arguments, const IndexReport& report) {
@@ -48,10 +60,10 @@ std::string text_of(const IndexArguments& arguments, const IndexReport& report) 
     return text + '\n';
   }
   const std::size_t levels = report.level_bytes.size();
-  std::string text = fmt::format("{}: {} index with leaf {} of {} level{}, {} in {}",
-                                 arguments.store, name_of(arguments.index.kind),
-                                 arguments.index.leaf, levels, levels == 1 ? "" : "s",
-                                 human_bytes(total(report)), human_seconds(report.seconds));
+  std::string text =
+      fmt::format("{}: {} index with leaf {} of {} level{}, {} in {}", arguments.store,
+                  kind_of(arguments), leaf_of(arguments), levels, levels == 1 ? "" : "s",
+                  human_bytes(total(report)), human_seconds(report.seconds));
   if (report.chunks_kept > 0)
     text += fmt::format(" ({} of {} files kept)", human_count(report.chunks_kept),
                         human_count(report.chunks));
@@ -86,22 +98,39 @@ IndexReport index_by_ranks(const std::string& store, IndexOptions options, Ranks
   return report;
 }
 
+/// Lists of labels, by this process alone.
+IndexReport index_labels(const IndexArguments& arguments, Console& console) {
+  const IndexOptions& options = arguments.index;
+  if (options.part || options.join > 0)
+    throw UsageError("--kind labels has no parts: leave out --part and --join");
+  if (options.leaf != kDefaultLeaf)
+    throw UsageError("--kind labels has lists of 32 cells along each edge: leave out --leaf");
+  return add_label_index(arguments.store,
+                         {.selection = options.selection,
+                          .memory = options.memory,
+                          .threads = options.threads,
+                          .resume = options.resume,
+                          .force = options.force},
+                         console.progress());
+}
+
 int run_index(const IndexArguments& arguments, Console& console) {
   check_store(arguments.store);
   const IndexOptions& options = arguments.index;
   const bool is_whole = !options.part && options.join == 0;
-  Ranks* const job = is_whole ? join_job(arguments.mpi, console) : nullptr;
+  Ranks* const job = is_whole && !arguments.has_labels ? join_job(arguments.mpi, console) : nullptr;
   if (is_whole && job == nullptr)
     set_interrupt_note([] { return "the same command with --resume goes on with what is done"; });
   else
     set_interrupt_note([] { return "the same command goes on with what is done"; });
-  const IndexReport report = job != nullptr
+  const IndexReport report = arguments.has_labels ? index_labels(arguments, console)
+                             : job != nullptr
                                  ? index_by_ranks(arguments.store, options, *job, console)
                                  : add_index(arguments.store, options, console.progress());
   nlohmann::ordered_json object{{"command", "index"},
                                 {"input", arguments.store},
-                                {"kind", name_of(options.kind)},
-                                {"leaf", options.leaf}};
+                                {"kind", kind_of(arguments)},
+                                {"leaf", leaf_of(arguments)}};
   if (options.part)
     object["part"] = {{"number", options.part->number}, {"count", options.part->count}};
   object["bytes"] = total(report);
@@ -125,8 +154,15 @@ void add_index(Program& program) {
       "isobrick index head.zarr --kind octree");
   add_path(app, "STORE", arguments->store,
            "Store to add to, or another program's Zarr image or array");
-  add_parsed(app, arguments->index.kind, parse_stored_kind,
-             {"--kind", "interval|kdtree|quadtree|octree", "Which structure", "octree"});
+  add_text(app,
+           {"--kind", "interval|kdtree|quadtree|octree|labels",
+            "Which structure; labels: lists of the labels in each brick of a label image, for "
+            "'isobrick extract --labels' of some of them",
+            "octree"},
+           [arguments = arguments.get()](const std::string& text) {
+             arguments->has_labels = text == kLabelIndex;
+             if (!arguments->has_labels) arguments->index.kind = parse_stored_kind(text);
+           });
   add_selection(app, arguments->index.selection);
   add_leaf(app, arguments->index.leaf);
   add_memory(app, arguments->index.memory);

@@ -16,8 +16,8 @@ std::optional<IndexKind> stored_kind(const std::string& text) {
 
 IndexKind parse_stored_kind(const std::string& text) {
   if (const auto kind = stored_kind(text)) return *kind;
-  throw UsageError(
-      fmt::format("unknown kind '{}'; the kinds are interval, kdtree, quadtree and octree", text));
+  throw UsageError(fmt::format(
+      "unknown kind '{}'; the kinds are interval, kdtree, quadtree, octree and labels", text));
 }
 
 IndexChoice parse_index_choice(const std::string& text) {

@@ -8,6 +8,7 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
+#include "bricks/ranges/index_layout.h"
 #include "bricks/zarr/store_names.h"
 #include "core/machine_memory.h"
 #include "pipeline/convert/convert_staging.h"
@@ -262,12 +263,14 @@ void add_store_options(CLI::App* app, ConvertOptions& options) {
       },
       {"--ome", "0.4|0.5",
        "Version of OME-Zarr; 0.4, with a file for each brick, for readers without Zarr 3", "0.5"});
-  add_parsed(app, options.index,
-             [](const std::string& text) {
-               return text == "none" ? std::nullopt : std::optional(parse_stored_kind(text));
-             },
-             {"--build-index", "none|interval|kdtree|quadtree|octree",
-              "Also add a search structure, as 'isobrick index' does", "none"});
+  add_text(app,
+           {"--build-index", "none|interval|kdtree|quadtree|octree|labels",
+            "Also add a search structure, as 'isobrick index' does", "none"},
+           [&options](const std::string& text) {
+             options.label_lists = text == kLabelIndex;
+             options.index.reset();
+             if (text != "none" && !options.label_lists) options.index = parse_stored_kind(text);
+           });
   add_leaf(app, options.leaf);
   add_memory(app, options.memory);
   add_threads(app, options.threads);

@@ -71,7 +71,8 @@ void check_space(const std::string& path, std::uint64_t bytes) {
 ConvertReport write_raw(VolumeSource& source, const std::string& path,
                         const ConvertOptions& options, Progress& progress) {
   if (options.resume) throw UsageError("--resume is for stores; a raw file is written anew");
-  if (options.index) throw UsageError("--build-index is for stores; a raw file has no index");
+  if (options.index || options.label_lists)
+    throw UsageError("--build-index is for stores; a raw file has no index");
   const Int3 extent = source.info().extent;
   const std::size_t sample_bytes = size_of(source.info().type);
   const Int3 piece = piece_extent(extent, sample_bytes,

@@ -52,7 +52,9 @@ IndexLayout parse_index_layout(std::string_view text, const std::string& where) 
   IndexLayout layout;
   layout.kind = json.string_at("kind");
   layout.leaf = json.at("leaf").integer();
-  if (!is_index_leaf(layout.leaf)) json.at("leaf").damaged("must be 1, 2, 4, 8 or 16");
+  const bool has_labels = layout.kind == kLabelIndex;
+  if (has_labels ? layout.leaf != kLabelLeaf : !is_index_leaf(layout.leaf))
+    json.at("leaf").damaged("must be 1, 2, 4, 8 or 16, of labels 32");
   layout.type = parse_type(json.at("data_type"));
   layout.extent = parse_extent(json.at("shape"));
   if (!json.at("zstd_level").raw().is_null())

@@ -19,7 +19,7 @@ struct IndexLayout {
   static constexpr Index kChunk = 8;   ///< index bricks along each edge of an index chunk
 
   std::string kind;  ///< "octree", …; what it means is not the store's concern
-  Index leaf = 16;   ///< 1, 2, 4, 8 or 16
+  Index leaf = 16;   ///< 1, 2, 4, 8 or 16; of label lists 32
   ScalarType type = ScalarType::u8;
   Int3 extent;                    ///< samples of the level
   std::optional<int> zstd_level;  ///< nothing: parts are stored as they are
@@ -50,6 +50,10 @@ struct IndexLayout {
     return 1 + static_cast<std::size_t>(linear_index(b - box.lo, box.extent()));
   }
 };
+
+/// The index of label lists, whose items are tiles.
+inline constexpr const char* kLabelIndex = "labels";
+inline constexpr Index kLabelLeaf = 32;
 
 /// True for the leaves that an index can have.
 constexpr bool is_index_leaf(Index leaf) {

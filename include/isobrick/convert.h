@@ -45,6 +45,7 @@ struct ConvertOptions {
   std::vector<std::filesystem::path> inputs = {};  ///< never replaced, beside the source's files
   std::optional<IndexKind> index = {};             ///< also add one of this kind to all levels
   Index leaf = kDefaultLeaf;                       ///< of that index
+  bool label_lists = false;                        ///< also add those of a label image
   /// Ends the operation with Cancelled, soon after a stop is requested on any thread.
   std::stop_token cancel = {};
   /// Writes only this part of the finest level, to the folder `out` + ".parts": the work of one of

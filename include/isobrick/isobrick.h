@@ -12,6 +12,7 @@
 #include <isobrick/histogram.h>
 #include <isobrick/index_build.h>
 #include <isobrick/isovalue.h>
+#include <isobrick/label_index.h>
 #include <isobrick/label_pieces.h>
 #include <isobrick/labels.h>
 #include <isobrick/mesh.h>

@@ -36,6 +36,9 @@ struct LabelOptions {
   /// at most.
   std::uint64_t memory = std::uint64_t{1} << 30;
   int threads = 0;  ///< 0: all cores
+  /// Where some labels are chosen and the store has lists of labels (add_label_index()), only
+  /// tiles that have one of them are looked at.
+  bool use_lists = true;
   int visits = 0;   ///< meshes that are passed on at the same time; 0: as many as threads
   /// The file or folder beside which the scratch file lies; "-": in the folder of temporary files.
   std::filesystem::path scratch_beside = "-";
@@ -69,6 +72,7 @@ struct LabelReport {
   std::uint64_t bricks_read = 0;    ///< different bricks that were read
   std::uint64_t brick_reads = 0;    ///< reads of bricks; more where one was repeated
   std::uint64_t bytes_read = 0;     ///< from disk
+  std::uint64_t index_bytes = 0;    ///< read from lists of labels; 0: these were not used
   std::uint64_t scratch_bytes = 0;  ///< of the scratch file
   double seconds = 0;               ///< wall time of all
   double write_seconds = 0;         ///< part of it in which the meshes were passed on

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include <isobrick/error.h>
+#include <isobrick/label_index.h>
 #include "bricks/store_writer.h"
 #include "core/cancellable_progress.h"
 #include "core/stopwatch.h"
@@ -40,6 +41,10 @@ IndexOptions index_options(const ConvertOptions& options, bool resume) {
           .threads = options.threads,
           .resume = resume,
           .force = true};
+}
+
+LabelIndexOptions label_index_options(const ConvertOptions& options, bool resume) {
+  return {.memory = options.memory, .threads = options.threads, .resume = resume, .force = true};
 }
 
 /// Whether the codec is still to be chosen. Throws UsageError for parts, which are made by tasks
@@ -165,11 +170,15 @@ ConvertReport Conversion::run() {
 }
 
 void Conversion::add_chosen_index(ConvertReport& report) {
-  if (!options_.index) return;
-  const IndexReport added =
-      add_index(staging_.path(), index_options(options_, staging_.resumed()), progress_);
-  for (const std::uint64_t bytes : added.level_bytes) report.index_bytes += bytes;
-  report.index_seconds = added.seconds;
+  const auto count = [&](const IndexReport& added) {
+    for (const std::uint64_t bytes : added.level_bytes) report.index_bytes += bytes;
+    report.index_seconds += added.seconds;
+  };
+  const fs::path& store = staging_.path();
+  const bool resumed = staging_.resumed();
+  if (options_.index) count(add_index(store, index_options(options_, resumed), progress_));
+  if (options_.label_lists)
+    count(add_label_index(store, label_index_options(options_, resumed), progress_));
 }
 
 /// `source` is of the first level.
@@ -271,6 +280,7 @@ ConvertReport convert(VolumeSource& source, const std::filesystem::path& out,
         source.memory() + (choose ? sampling_bytes(finest, layout.zstd_level, samplers) : 0),
         index_memory);
   if (options.index) check_index_options(index_options(options, false), finest);
+  if (options.label_lists) check_label_index_options(label_index_options(options, false), finest);
   std::optional<JoinedParts> joined;
   if (options.join > 0) joined.emplace(layout, out, options.join);
   // What an interrupted join has moved is not in the parts any more.

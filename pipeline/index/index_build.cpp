@@ -3,12 +3,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <utility>
 #include <vector>
 
 #include <isobrick/error.h>
+#include <isobrick/label_index.h>
 #include "core/cancellable_progress.h"
 #include "core/stopwatch.h"
 #include "index/leaf_ranges.h"
@@ -18,6 +20,7 @@
 #include "pipeline/index/index_chunk_builder.h"
 #include "pipeline/index/index_join.h"
 #include "pipeline/index/index_part.h"
+#include "pipeline/index/label_chunk_builder.h"
 #include "pipeline/index/level_index.h"
 #include "pipeline/program_memory.h"
 #include "pipeline/workers.h"
@@ -27,19 +30,52 @@ namespace {
 
 namespace fs = std::filesystem;
 
+/// What an index has.
+struct IndexContents {
+  std::function<IndexLayout(const StoreReader& store, int level)> layout;
+  /// What makes the parts of a level, in so much memory.
+  std::function<MakeIndexParts(const StoreReader& store, int level, const IndexLayout& layout,
+                               std::uint64_t memory, int threads)>
+      builder;
+  /// Throws UsageError where the budget, of which `others` bytes are in use, is too small.
+  std::function<void(const Lattice& lattice, std::uint64_t others)> check;
+};
+
+IndexContents span_index(const IndexOptions& options) {
+  return {.layout = [&](const StoreReader& store,
+                        int level) { return index_layout(store, level, options); },
+          .builder =
+              [&](const StoreReader& store, int level, const IndexLayout& layout,
+                  std::uint64_t memory, int threads) {
+                return span_index_parts(store, level, layout, options.kind, memory, threads);
+              },
+          .check = [&](const Lattice& lattice,
+                       std::uint64_t others) { check_index_options(options, lattice, others); }};
+}
+
+IndexContents label_index(const LabelIndexOptions& options) {
+  return {.layout = label_index_layout,
+          .builder = label_index_parts,
+          .check = [&](const Lattice& lattice, std::uint64_t others) {
+            check_label_index_options(options, lattice, others);
+          }};
+}
+
 /// An index on its way into a store, in one process or out of parts.
 class IndexBuild {
  public:
-  IndexBuild(const fs::path& path, const IndexOptions& given, int threads, Progress& progress)
+  /// `contents` must outlive it.
+  IndexBuild(const fs::path& path, const IndexOptions& given, const IndexContents& contents,
+             int threads, Progress& progress)
       : path_(path),
         options_(given),
+        contents_(contents),
         threads_(threads),
         progress_(progress),
         store_(std::make_unique<StoreReader>(path, given.selection)) {
     // What decoding takes beyond bricks is nobody else's.
     options_.memory -= std::min(given.memory, decode_extra(store_->info(), threads));
-    check_index_options(given, store_->info().levels.front().lattice,
-                        given.memory - options_.memory);
+    contents.check(store_->info().levels.front().lattice, given.memory - options_.memory);
     options_.resume |= given.join > 0;  // what an interrupted join has moved is in no part any more
   }
 
@@ -53,13 +89,14 @@ class IndexBuild {
   std::vector<LevelIndex> levels() const {
     std::vector<LevelIndex> all;
     for (int level = 0; level < static_cast<int>(store_->info().levels.size()); ++level)
-      all.emplace_back(*store_, level, options_);
+      all.emplace_back(*store_, level, options_, contents_.layout(*store_, level));
     return all;
   }
   void complete_ranges(const std::optional<JoinedIndexParts>& parts, IndexReport& report);
 
   const fs::path& path_;
   IndexOptions options_;
+  const IndexContents& contents_;
   int threads_;
   Progress& progress_;
   std::unique_ptr<StoreReader> store_;
@@ -102,13 +139,22 @@ IndexReport IndexBuild::run() {
   progress_.begin("index", bricks);
   for (std::size_t i = 0; i < levels.size(); ++i) {
     levels[i].prepare(publisher);
-    levels[i].build(options_.memory, threads_, publisher, progress_, report,
-                    parts ? parts->chunks_of(static_cast<int>(i), publisher) : nullptr);
+    const int level = static_cast<int>(i);
+    levels[i].build(
+        contents_.builder(*store_, level, levels[i].layout(), options_.memory, threads_), publisher,
+        progress_, report, parts ? parts->chunks_of(level, publisher) : nullptr);
   }
   for (const LevelIndex& level : levels) level.publish(publisher.folder());
   progress_.end();
   if (parts) parts->remove();
   return report;
+}
+
+void refuse_url(const fs::path& store) {
+  if (is_url(store.native()))
+    throw UsageError(fmt::format(
+        "'{0}': nothing can be written to a URL; make a store of it: isobrick convert {0} OUT.zarr",
+        store.native()));
 }
 
 }  // namespace
@@ -135,10 +181,7 @@ void check_index_options(const IndexOptions& options, const Lattice& lattice,
 }
 
 IndexReport add_index(const fs::path& store, const IndexOptions& options, Progress& listener) {
-  if (is_url(store.native()))
-    throw UsageError(fmt::format(
-        "'{0}': nothing can be written to a URL; make a store of it: isobrick convert {0} OUT.zarr",
-        store.native()));
+  refuse_url(store);
   if (options.part && options.join > 0)
     throw UsageError("a part is made or all parts are joined, not both at once");
   if (options.part) check_part(*options.part);
@@ -148,9 +191,38 @@ IndexReport add_index(const fs::path& store, const IndexOptions& options, Progre
   Stopwatch watch;
   Workers workers(options.threads);
   IndexReport report = workers.execute([&] {
-    IndexBuild build(store, options, workers.threads(), progress);
+    const IndexContents contents = span_index(options);
+    IndexBuild build(store, options, contents, workers.threads(), progress);
     return options.part ? build.make_part() : build.run();
   });
+  report.seconds = watch.lap();
+  return report;
+}
+
+void check_label_index_options(const LabelIndexOptions& options, const Lattice& lattice,
+                               std::uint64_t others) {
+  const std::uint64_t least =
+      others + LabelChunkBuilder::min_memory(lattice, Workers(options.threads).threads());
+  if (options.memory < least)
+    throw UsageError(fmt::format(
+        "a memory budget of {:.1f} MiB is too small: lists of labels need --memory {}M at least",
+        in_mib(options.memory), mib_above(least)));
+}
+
+IndexReport add_label_index(const fs::path& store, const LabelIndexOptions& options,
+                            Progress& listener) {
+  refuse_url(store);
+  CancellableProgress progress(listener, options.cancel);
+  Stopwatch watch;
+  Workers workers(options.threads);
+  const IndexOptions build{.selection = options.selection,
+                           .memory = options.memory,
+                           .threads = options.threads,
+                           .resume = options.resume,
+                           .force = options.force};
+  const IndexContents contents = label_index(options);
+  IndexReport report = workers.execute(
+      [&] { return IndexBuild(store, build, contents, workers.threads(), progress).run(); });
   report.seconds = watch.lap();
   return report;
 }

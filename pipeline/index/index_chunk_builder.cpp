@@ -21,14 +21,6 @@ namespace {
 constexpr Index kEdge = IndexLayout::kBrick;
 constexpr Index kBrickBlocks = kEdge / kBlockEdge;
 
-/// The samples of a cube of so many index bricks along each edge, with the layer
-/// of their upper neighbours.
-std::uint64_t piece_bytes(const Lattice& lattice, Index bricks) {
-  const Index samples = bricks * kEdge + 1;
-  return static_cast<std::uint64_t>(volume(min({samples, samples, samples}, lattice.extent))) *
-         lattice.sample_bytes();
-}
-
 /// Making one part: its ranges, what sorting them takes, the index, encoded.
 std::uint64_t part_bytes(ScalarType type, Index leaf) {
   const auto edge = static_cast<std::uint64_t>(kEdge / leaf);
@@ -36,21 +28,27 @@ std::uint64_t part_bytes(ScalarType type, Index leaf) {
   return edge * edge * edge * (2 * size + 4 * (2 * size + 8) + 2 * (24 + 6 * size)) + 65536;
 }
 
-/// What reading samples takes: shard indices, and a brick a thread, encoded and decoded.
-std::uint64_t reading_bytes(const Lattice& lattice, int threads) {
-  return std::min(std::uint64_t{64} << 20,
-                  32 * static_cast<std::uint64_t>(volume(lattice.bricks()))) +
-         static_cast<std::uint64_t>(threads) * lattice.brick_bytes() * 9 / 4;
-}
-
 std::uint64_t memory_for(const Lattice& lattice, Index leaf, int threads, Index piece,
                          std::uint64_t batch) {
   std::uint64_t bytes = kProgramBytes + batch * part_bytes(lattice.type, leaf);
-  if (leaf < kBlockEdge) bytes += reading_bytes(lattice, threads) + piece_bytes(lattice, piece);
+  if (leaf < kBlockEdge)
+    bytes += index_reading_bytes(lattice, threads) + index_piece_bytes(lattice, piece);
   return bytes;
 }
 
 }  // namespace
+
+std::uint64_t index_piece_bytes(const Lattice& lattice, Index bricks) {
+  const Index samples = bricks * kEdge + 1;
+  return static_cast<std::uint64_t>(volume(min({samples, samples, samples}, lattice.extent))) *
+         lattice.sample_bytes();
+}
+
+std::uint64_t index_reading_bytes(const Lattice& lattice, int threads) {
+  return std::min(std::uint64_t{64} << 20,
+                  32 * static_cast<std::uint64_t>(volume(lattice.bricks()))) +
+         static_cast<std::uint64_t>(threads) * lattice.brick_bytes() * 9 / 4;
+}
 
 std::uint64_t IndexChunkBuilder::min_memory(const Lattice& lattice, Index leaf, int threads) {
   return memory_for(lattice, leaf, threads, 1, 1);
@@ -242,6 +240,16 @@ void IndexChunkBuilder::build(Int3 chunk, const Encode& encode, const Take& take
   visit_scalar(layout_.type, [&](auto tag) {
     Chunk<typename decltype(tag)::type>(*this, chunk, encode, take).run();
   });
+}
+
+MakeIndexParts span_index_parts(const StoreReader& store, int level, const IndexLayout& layout,
+                                IndexKind kind, std::uint64_t memory, int threads,
+                                IndexInput input) {
+  const auto builder =
+      std::make_shared<IndexChunkBuilder>(store, level, layout, kind, memory, threads, input);
+  return [builder](Int3 c, const EncodeIndexPart& encode, const TakeIndexPart& take) {
+    builder->build(c, encode, take);
+  };
 }
 
 }  // namespace isobrick

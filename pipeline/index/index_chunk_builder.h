@@ -17,6 +17,20 @@ enum class IndexInput : std::uint8_t {
   samples  ///< samples alone, as they are now; for leaves below 16
 };
 
+/// The samples of a cube of so many index bricks along each edge, with the layer of their upper
+/// neighbours.
+std::uint64_t index_piece_bytes(const Lattice& lattice, Index bricks);
+/// What reading samples takes: shard indices, and a brick a thread, encoded and decoded.
+std::uint64_t index_reading_bytes(const Lattice& lattice, int threads);
+
+/// What becomes of each part of an index chunk; called from any thread.
+using EncodeIndexPart = std::function<std::vector<std::byte>(std::vector<std::byte>)>;
+/// Takes a part of a chunk, encoded.
+using TakeIndexPart = std::function<void(std::size_t part, std::vector<std::byte>)>;
+/// Makes the parts of a chunk: each is encoded, then taken.
+using MakeIndexParts =
+    std::function<void(Int3 chunk, const EncodeIndexPart& encode, const TakeIndexPart& take)>;
+
 /// Makes the parts of a level's index chunks from the level's ranges and, for
 /// leaves below 16, from its samples. Bricks whose range no isovalue stabs have
 /// no part. Where there are ranges, such bricks are not read.
@@ -29,10 +43,8 @@ class IndexChunkBuilder {
   IndexChunkBuilder(const StoreReader& store, int level, const IndexLayout& layout, IndexKind kind,
                     std::uint64_t memory, int threads, IndexInput input = IndexInput::ranges);
 
-  /// What becomes of each part; called from any thread.
-  using Encode = std::function<std::vector<std::byte>(std::vector<std::byte>)>;
-  /// Takes a part of a chunk, encoded.
-  using Take = std::function<void(std::size_t part, std::vector<std::byte>)>;
+  using Encode = EncodeIndexPart;
+  using Take = TakeIndexPart;
 
   /// The directory first, then the index bricks in Morton order, whatever the
   /// memory; of samples alone the directory comes last. Parallel in the caller's arena.
@@ -50,5 +62,10 @@ class IndexChunkBuilder {
   std::size_t batch_ = 1;  ///< parts made at a time
   Index piece_ = 1;        ///< index bricks along each edge of what is read at a time
 };
+
+/// The same as a function, which owns the builder.
+MakeIndexParts span_index_parts(const StoreReader& store, int level, const IndexLayout& layout,
+                                IndexKind kind, std::uint64_t memory, int threads,
+                                IndexInput input = IndexInput::ranges);
 
 }  // namespace isobrick

@@ -134,10 +134,10 @@ void make_chunks(const StoreReader& store, const IndexParts& parts, const IndexO
     const fs::path path = parts.chunk_file(number, chunk);
     const bool kept = IndexChunk::is_whole(path, layout.parts_of_chunk(chunk.chunk), name);
     if (!kept) {
-      const IndexChunkBuilder builder(store, chunk.level, layout, options.kind, memory, threads,
-                                      input);
       publisher.discard_temporary(path);
-      build_index_chunk(builder, layout, name, path, publisher);
+      build_index_chunk(
+          span_index_parts(store, chunk.level, layout, options.kind, memory, threads, input),
+          layout, name, path, publisher);
     }
     ++report.chunks;
     report.chunks_kept += kept;
@@ -158,7 +158,7 @@ IndexReport make_index_part(const StoreReader& store, const IndexOptions& option
   begun.resume = true;
   bool is_there = !options.force;
   for (int level = 0; level < static_cast<int>(store.info().levels.size()); ++level) {
-    const LevelIndex index(store, level, begun);
+    const LevelIndex index(store, level, begun, index_layout(store, level, begun));
     index.check();
     is_there = is_there && index.is_there();
   }

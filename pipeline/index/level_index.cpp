@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <string_view>
+#include <utility>
 
 #include <isobrick/error.h>
 #include <isobrick/pod_buffer.h>
@@ -42,21 +43,26 @@ bool needs_ranges(const StoreReader& store, const IndexOptions& options) {
 }
 
 IndexLayout index_layout(const StoreReader& store, int level, const IndexOptions& options) {
+  return index_layout(store, level, std::string(name_of(options.kind)), options.leaf);
+}
+
+IndexLayout index_layout(const StoreReader& store, int level, std::string kind, Index leaf) {
   const LevelInfo& info = store.info().levels[static_cast<std::size_t>(level)];
-  return {.kind = std::string(name_of(options.kind)),
-          .leaf = options.leaf,
+  return {.kind = std::move(kind),
+          .leaf = leaf,
           .type = store.info().type,
           .extent = info.lattice.extent,
           .zstd_level = zstd_level_of(store.info()),
           .ranges_crc32c = info.block_ranges_crc32c};
 }
 
-LevelIndex::LevelIndex(const StoreReader& store, int level, const IndexOptions& options)
+LevelIndex::LevelIndex(const StoreReader& store, int level, const IndexOptions& options,
+                       IndexLayout layout)
     : store_(store),
       level_(level),
       options_(options),
       entries_(StoreEntries::of(store.info().levels)),
-      layout_(index_layout(store, level, options)),
+      layout_(std::move(layout)),
       index_folder_in_store_(index_folder("", level, layout_.kind)),
       place_(store.storage()->local_path() /
              index_folder(store.info().additions, level, layout_.kind)),
@@ -133,7 +139,7 @@ void LevelIndex::prepare(Publisher& publisher) {
   publisher.wait();  // before any chunk, which would else be of nobody knows what
 }
 
-void build_index_chunk(const IndexChunkBuilder& builder, const IndexLayout& layout,
+void build_index_chunk(const MakeIndexParts& make, const IndexLayout& layout,
                        const IndexChunkName& name, const fs::path& path, Publisher& publisher) {
   IndexChunkWriter writer(publisher, path, layout.parts_of_chunk(name.chunk), name);
   // The directory comes first in the file, and may be made last: what is made before it waits.
@@ -143,7 +149,7 @@ void build_index_chunk(const IndexChunkBuilder& builder, const IndexLayout& layo
   std::vector<Waiting> waiting;
   std::unique_ptr<FileWriter> scratch;
   bool has_directory = false;
-  builder.build(
+  make(
       name.chunk,
       [&](std::vector<std::byte> part) { return encode_index_part(layout.zstd_level, part); },
       [&](std::size_t part, std::vector<std::byte> encoded) {
@@ -164,9 +170,8 @@ void build_index_chunk(const IndexChunkBuilder& builder, const IndexLayout& layo
   writer.publish();
 }
 
-void LevelIndex::build(std::uint64_t memory, int threads, Publisher& publisher, Progress& progress,
+void LevelIndex::build(const MakeIndexParts& make, Publisher& publisher, Progress& progress,
                        IndexReport& report, const TakeIndexChunk& take) const {
-  const IndexChunkBuilder builder(store_, level_, layout_, options_.kind, memory, threads);
   const std::uint32_t checksum = checksum_of(layout_);
   std::uint64_t bytes = 0;
   for_each_morton(layout_.chunks(), [&](Int3 c) {
@@ -175,7 +180,7 @@ void LevelIndex::build(std::uint64_t memory, int threads, Publisher& publisher, 
     const bool taken = !finished_ && take && take(name, path);
     const bool kept = finished_ || (!taken && options_.resume &&
                                     IndexChunk::is_whole(path, layout_.parts_of_chunk(c), name));
-    if (!taken && !kept) build_index_chunk(builder, layout_, name, path, publisher);
+    if (!taken && !kept) build_index_chunk(make, layout_, name, path, publisher);
     ++report.chunks;
     report.chunks_kept += kept;
     const Int3 bricks = layout_.bricks_of_chunk(c).extent();

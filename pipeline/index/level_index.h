@@ -27,10 +27,14 @@ bool needs_ranges(const StoreReader& store, const IndexOptions& options);
 /// What an index of a level of a store is like.
 IndexLayout index_layout(const StoreReader& store, int level, const IndexOptions& options);
 
+IndexLayout index_layout(const StoreReader& store, int level, std::string kind, Index leaf);
+
 /// One level's index on its way into the store: it grows as KIND.partial beside its place.
 class LevelIndex {
  public:
-  LevelIndex(const StoreReader& store, int level, const IndexOptions& options);
+  /// Of the kind and leaf of `layout`; of the options only how it is built matters. The store and
+  /// the options must outlive it.
+  LevelIndex(const StoreReader& store, int level, const IndexOptions& options, IndexLayout layout);
 
   /// Throws UsageError when there is one and neither `resume` nor `force` is set.
   void check() const;
@@ -40,8 +44,9 @@ class LevelIndex {
   bool has_chunk(Int3 chunk) const;
   /// Decides what of an earlier run stays, and makes the folder.
   void prepare(Publisher& publisher);
+  const IndexLayout& layout() const { return layout_; }
   /// Builds the chunks that `take`, if there is any, does not have and that are not there.
-  void build(std::uint64_t memory, int threads, Publisher& publisher, Progress& progress,
+  void build(const MakeIndexParts& make, Publisher& publisher, Progress& progress,
              IndexReport& report, const TakeIndexChunk& take = nullptr) const;
   void publish(const OutputFolder& folder) const;
 
@@ -61,7 +66,7 @@ class LevelIndex {
 };
 
 /// Makes one chunk as a file of that name.
-void build_index_chunk(const IndexChunkBuilder& builder, const IndexLayout& layout,
+void build_index_chunk(const MakeIndexParts& make, const IndexLayout& layout,
                        const IndexChunkName& name, const std::filesystem::path& path,
                        Publisher& publisher);
 

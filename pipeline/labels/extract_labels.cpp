@@ -22,6 +22,7 @@ LabelReport extract_labels(const StoreReader& store, const LabelOptions& options
     read.bricks_read = pass.bricks_read;
     read.brick_reads = pass.brick_reads;
     read.bytes_read = pass.bytes_read;
+    read.index_bytes = pass.index_bytes;
     Workers workers(plan.threads);
     report = meshes.finish(workers, visit, progress);
   }
@@ -29,6 +30,7 @@ LabelReport extract_labels(const StoreReader& store, const LabelOptions& options
   report.bricks_read = read.bricks_read;
   report.brick_reads = read.brick_reads;
   report.bytes_read = read.bytes_read;
+  report.index_bytes = read.index_bytes;
   report.seconds = read.seconds;
   return report;
 }

@@ -4,7 +4,7 @@
 
 #include <isobrick/labels.h>
 #include <isobrick/transform.h>
-#include "pipeline/labels/label_search.h"
+#include "pipeline/labels/label_selection.h"
 #include "surface/labels/label_points.h"
 
 namespace isobrick::inline v0 {

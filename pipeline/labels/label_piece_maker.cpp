@@ -16,10 +16,11 @@ PartPlans LabelPieceMaker::plan(const StoreReader& store, const LabelOptions& op
                                 std::uint32_t parts) {
   check_part({1, parts});
   const LabelImage image = label_image_of(store, options);
+  // By ranges alone: tasks divide alike whether or not their stores have lists.
   PartPlans plans;
   plans.grid = store.info().levels[static_cast<std::size_t>(options.level)].lattice.tiles();
   divide_tiles(plans, parts, [&](auto&& f) {
-    TileStream tiles = label_tiles(store, options.level, image, {});
+    TileStream tiles = label_tiles(store, options.level, image, {}, false);
     while (const auto work = tiles.next())
       f(*work, static_cast<std::uint64_t>(std::popcount(work->active_blocks)));
   });

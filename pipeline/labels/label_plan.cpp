@@ -8,6 +8,7 @@
 #include <isobrick/error.h>
 #include "core/tile.h"
 #include "pipeline/extract/extract_plan.h"
+#include "pipeline/labels/label_list_search.h"
 #include "pipeline/labels/label_spool.h"
 #include "pipeline/program_memory.h"
 #include "surface/labels/label_tile.h"
@@ -71,13 +72,16 @@ LabelPlan plan_label_memory(const StoreReader& store, const LabelOptions& option
   const Lattice& lattice = level.lattice;
   const int threads = threads_of(options);
   const Index reach = LabelTile::sample_reach(label_smoothing(options));
-  return divide({.type = lattice.type,
-                 .fixed = reading_bytes(level, threads) + decode_extra(store.info(), threads) +
-                          store.storage()->memory(),
-                 .brick_bytes = lattice.brick_bytes(),
-                 .tile_bricks = max_bricks_of_tile(lattice, reach),
-                 .bricks = static_cast<std::uint64_t>(volume(lattice.bricks()))},
-                options);
+  const bool searches =
+      options.use_lists && !options.labels.empty() && has_index(store, options.level, kLabelIndex);
+  return divide(
+      {.type = lattice.type,
+       .fixed = reading_bytes(level, threads) + decode_extra(store.info(), threads) +
+                store.storage()->memory() + (searches ? LabelListSearch::bytes(lattice) : 0),
+       .brick_bytes = lattice.brick_bytes(),
+       .tile_bricks = max_bricks_of_tile(lattice, reach),
+       .bricks = static_cast<std::uint64_t>(volume(lattice.bricks()))},
+      options);
 }
 
 LabelPlan plan_label_memory(ScalarType type, std::uint64_t source_bytes,

@@ -1,44 +1,30 @@
 #pragma once
 
 #include <cstdint>
-#include <vector>
+#include <optional>
 
 #include <isobrick/labels.h>
 #include "core/tile_range.h"
+#include "pipeline/labels/label_list_search.h"
+#include "pipeline/labels/label_selection.h"
 #include "stream/block_search.h"
 
 namespace isobrick::inline v0 {
-
-/// The labels that are chosen.
-class LabelSelection {
- public:
-  /// Throws UsageError for a range that ends before it begins.
-  LabelSelection(std::vector<LabelRange> ranges, std::int64_t background);
-
-  bool contains(std::int64_t label) const;
-  /// Whether a label from `lo` to `hi` may be chosen.
-  bool meets(double lo, double hi) const;
-  /// In ascending order, disjoint; none: all but the background.
-  const std::vector<LabelRange>& ranges() const { return ranges_; }
-
- private:
-  std::vector<LabelRange> ranges_;
-  std::int64_t background_;
-};
 
 /// Finds the blocks that a label's boundary may pass through, by the ranges of blocks: those with a
 /// chosen label in their range that have more than one value or lie at the region's border.
 class LabelSearch final : public BlockSearch {
  public:
-  /// Only tiles of `range`. The others must outlive it.
+  /// Only tiles of `range`. Where the store has lists of labels and `uses_lists` is set, tiles
+  /// without a chosen label are left out. The others must outlive it. Throws as StoredIndex does.
   LabelSearch(const StoreReader& store, int level, const LabelSelection& labels, Box3 roi,
-              const TileRange& range)
-      : store_(store), level_(level), labels_(labels), roi_(roi), range_(range) {}
+              const TileRange& range, bool uses_lists);
 
   /// `isovalues` does not matter.
   void append_tiles(Int3 chunk, Box3 box, std::span<const double> isovalues,
                     std::span<std::vector<TileWork>> tiles) override;
   std::uint64_t range_bytes() const override { return bytes_read_; }
+  std::uint64_t index_bytes() const override { return lists_ ? lists_->bytes_read() : 0; }
 
  private:
   bool needs(Int3 block, const ValueRange<double>& range) const;
@@ -48,6 +34,7 @@ class LabelSearch final : public BlockSearch {
   const LabelSelection& labels_;
   Box3 roi_;
   TileRange range_;
+  std::optional<LabelListSearch> lists_;
   std::uint64_t bytes_read_ = 0;
 };
 

@@ -7,6 +7,7 @@
 
 #include <isobrick/error.h>
 #include "pipeline/extract/mesh_header.h"
+#include "pipeline/labels/label_search.h"
 #include "stream/batch_lookahead.h"
 #include "stream/brick_cache.h"
 
@@ -73,10 +74,11 @@ LabelImage label_image_of(const StoreReader& store, const LabelOptions& options)
 }
 
 TileStream label_tiles(const StoreReader& store, int level, const LabelImage& image,
-                       const TileRange& range) {
+                       const TileRange& range, bool uses_lists) {
   const Lattice& lattice = store.info().levels[static_cast<std::size_t>(level)].lattice;
-  TileStream tiles(std::make_unique<LabelSearch>(store, level, image.labels, image.roi, range),
-                   lattice, image.tiles());
+  TileStream tiles(
+      std::make_unique<LabelSearch>(store, level, image.labels, image.roi, range, uses_lists),
+      lattice, image.tiles());
   tiles.restrict_to(range);
   return tiles;
 }
@@ -87,9 +89,13 @@ LabelReport run_label_pass(const StoreReader& store, const LabelOptions& options
   LabelReport report;
   const std::uint64_t bytes_before = store.bytes_read();
   LabelPass pass(image, options, plan, std::move(append), progress);
-  const auto tiles = [&] { return label_tiles(store, options.level, image, range); };
+  const auto tiles = [&] {
+    return label_tiles(store, options.level, image, range, options.use_lists);
+  };
   std::uint64_t count = 0;
-  for (TileStream counted = tiles(); counted.next();) ++count;
+  TileStream counted = tiles();
+  while (counted.next()) ++count;
+  report.index_bytes = counted.index_bytes();
   pass.begin(count);
   pass.workers().execute([&] { make_all(store, options.level, tiles(), plan, pass, report); });
   pass.end();

@@ -13,10 +13,10 @@ namespace isobrick::inline v0 {
 /// makes no sense.
 LabelImage label_image_of(const StoreReader& store, const LabelOptions& options);
 
-/// The tiles of `range` that may have a piece of a chosen label, by the ranges of blocks. The store
-/// and the image must outlive them.
+/// The tiles of `range` that may have a piece of a chosen label, by the ranges of blocks and, with
+/// `uses_lists`, the store's lists of labels. The store and the image must outlive them.
 TileStream label_tiles(const StoreReader& store, int level, const LabelImage& image,
-                       const TileRange& range);
+                       const TileRange& range, bool uses_lists);
 
 /// Makes the pieces of these tiles. What was read of the store is in the report.
 LabelReport run_label_pass(const StoreReader& store, const LabelOptions& options,

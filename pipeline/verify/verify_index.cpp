@@ -4,11 +4,15 @@
 
 #include <algorithm>
 #include <optional>
+#include <span>
+#include <utility>
 #include <vector>
 
 #include <isobrick/error.h>
 #include "core/morton.h"
+#include "index/label_lists.h"
 #include "pipeline/index/index_chunk_builder.h"
+#include "pipeline/index/label_chunk_builder.h"
 #include "pipeline/program_memory.h"
 #include "pipeline/workers.h"
 #include "stream/index_search.h"
@@ -25,29 +29,35 @@ struct ExpectedPart {
   bool known = true;
 };
 
+/// Throws DamageError for the bytes of a part that are not sound; `grid` is that of its items.
+using OpenPart =
+    std::function<void(std::span<const std::byte> bytes, const IndexLayout& layout, Int3 grid)>;
+
 class IndexCheck {
  public:
-  IndexCheck(const StoreReader& store, int level, IndexKind kind,
+  IndexCheck(const StoreReader& store, int level, std::string kind, OpenPart open,
              const std::function<void(const std::string&)>& damage)
       : level_(level),
-        kind_(kind),
+        kind_(std::move(kind)),
+        open_(std::move(open)),
         damage_(damage),
-        index_(store, level, std::string(name_of(kind))) {}
+        index_(store, level, kind_) {}
 
   const IndexLayout& layout() const { return index_.layout(); }
   std::uint64_t bytes_read() const { return bytes_read_; }
 
-  /// Compares a chunk with what `builder` makes of the same cells.
-  void run(Int3 c, const IndexChunkBuilder& builder);
+  /// Compares a chunk with what `make` makes of the same cells.
+  void run(Int3 c, const MakeIndexParts& make);
 
  private:
   std::string name_of_part(Box3 bricks, std::size_t part) const;
   std::optional<std::string> wrong(const IndexChunk& chunk, Box3 bricks, std::size_t part,
                                    const ExpectedPart& expected) const;
-  void check_parts(const IndexChunk& chunk, Int3 c, const IndexChunkBuilder& builder);
+  void check_parts(const IndexChunk& chunk, Int3 c, const MakeIndexParts& make);
 
   int level_;
-  IndexKind kind_;
+  std::string kind_;
+  OpenPart open_;
   const std::function<void(const std::string&)>& damage_;
   StoredIndex index_;
   std::uint64_t bytes_read_ = 0;
@@ -59,7 +69,7 @@ Int3 brick_of(Box3 bricks, std::size_t part) {
 
 std::string IndexCheck::name_of_part(Box3 bricks, std::size_t part) const {
   if (part == IndexLayout::kDirectory)
-    return fmt::format("level {}, {} index, directory", level_, name_of(kind_));
+    return fmt::format("level {}, {} index, directory", level_, kind_);
   return index_brick_name(level_, kind_, brick_of(bricks, part));
 }
 
@@ -81,7 +91,7 @@ std::optional<std::string> IndexCheck::wrong(const IndexChunk& chunk, Box3 brick
                         ? bricks.extent()
                         : layout().leaves_of_brick(brick_of(bricks, part));
   try {
-    open_index_part(bytes, kind_, layout().type, grid);
+    open_(bytes, layout(), grid);
   } catch (const DamageError& e) {
     return chunk.where(part) + ": " + e.what();
   }
@@ -91,7 +101,7 @@ std::optional<std::string> IndexCheck::wrong(const IndexChunk& chunk, Box3 brick
 }
 
 /// Each part that must be there, then those that must not be.
-void IndexCheck::check_parts(const IndexChunk& chunk, Int3 c, const IndexChunkBuilder& builder) {
+void IndexCheck::check_parts(const IndexChunk& chunk, Int3 c, const MakeIndexParts& make) {
   const Box3 bricks = layout().bricks_of_chunk(c);
   std::vector<bool> seen(layout().parts_of_chunk(c));
   const auto check = [&](std::size_t part, const ExpectedPart& expected) {
@@ -101,7 +111,7 @@ void IndexCheck::check_parts(const IndexChunk& chunk, Int3 c, const IndexChunkBu
   };
   bool known = true;
   try {
-    builder.build(
+    make(
         c, [](std::vector<std::byte> part) { return part; },
         [&](std::size_t part, const std::vector<std::byte>& bytes) { check(part, {&bytes}); });
   } catch (const DamageError&) {
@@ -111,15 +121,56 @@ void IndexCheck::check_parts(const IndexChunk& chunk, Int3 c, const IndexChunkBu
     if (!seen[part]) check(part, {nullptr, known});
 }
 
-void IndexCheck::run(Int3 c, const IndexChunkBuilder& builder) {
+void IndexCheck::run(Int3 c, const MakeIndexParts& make) {
   try {
     const IndexChunk chunk = index_.open(c);
-    check_parts(chunk, c, builder);
+    check_parts(chunk, c, make);
     bytes_read_ += chunk.bytes_read();
   } catch (const Error& e) {
-    damage_(fmt::format("level {}, {} index, chunk ({}, {}, {}): {}", level_, name_of(kind_), c.x,
-                        c.y, c.z, e.what()));
+    damage_(fmt::format("level {}, {} index, chunk ({}, {}, {}): {}", level_, kind_, c.x, c.y, c.z,
+                        e.what()));
   }
+}
+
+/// How an index of a kind is checked.
+struct CheckedKind {
+  OpenPart open;
+  /// Least memory on so many threads.
+  std::function<std::uint64_t(const Lattice& lattice, const IndexLayout& layout, int threads)>
+      least;
+  std::function<MakeIndexParts(const StoreReader& store, int level, const IndexLayout& layout,
+                               std::uint64_t memory, int threads)>
+      builder;
+};
+
+CheckedKind checked_labels() {
+  return {
+      .open = [](std::span<const std::byte> bytes, const IndexLayout&,
+                 Int3 grid) { unpack_label_lists(bytes, static_cast<std::size_t>(volume(grid))); },
+      .least = [](const Lattice& lattice, const IndexLayout&,
+                  int threads) { return LabelChunkBuilder::min_memory(lattice, threads); },
+      .builder = label_index_parts};
+}
+
+CheckedKind checked_ranges(IndexKind kind) {
+  return {.open = [kind](std::span<const std::byte> bytes, const IndexLayout& layout,
+                         Int3 grid) { open_index_part(bytes, kind, layout.type, grid); },
+          .least =
+              [](const Lattice& lattice, const IndexLayout& layout, int threads) {
+                return IndexChunkBuilder::min_memory(lattice, layout.leaf, threads);
+              },
+          .builder =
+              [kind](const StoreReader& store, int level, const IndexLayout& layout,
+                     std::uint64_t memory, int threads) {
+                return span_index_parts(store, level, layout, kind, memory, threads);
+              }};
+}
+
+std::optional<CheckedKind> checked_kind(const std::string& name) {
+  if (name == kLabelIndex) return checked_labels();
+  const auto kind = parse_index_kind(name);
+  if (!kind || *kind == IndexKind::linear) return std::nullopt;
+  return checked_ranges(*kind);
 }
 
 }  // namespace
@@ -128,30 +179,30 @@ std::uint64_t verify_index(const StoreReader& store, int level, const std::strin
                            int threads, std::uint64_t memory,
                            const std::function<void(const std::string&)>& damage,
                            Progress& progress) {
-  const auto known = parse_index_kind(kind);
-  if (!known || *known == IndexKind::linear) {
+  const std::optional<CheckedKind> known = checked_kind(kind);
+  if (!known) {
     damage(
         fmt::format("level {}: '{}' is no kind of index that this program knows", level,
                     store.storage()->name_of(index_folder(store.info().additions, level, kind))));
     return 0;
   }
   try {
-    IndexCheck check(store, level, *known, damage);
+    IndexCheck check(store, level, kind, known->open, damage);
     const IndexLayout& layout = check.layout();
     const Lattice& lattice = store.info().levels[static_cast<std::size_t>(level)].lattice;
-    const auto least = [&] { return IndexChunkBuilder::min_memory(lattice, layout.leaf, threads); };
+    const auto least = [&] { return known->least(lattice, layout, threads); };
     while (threads > 1 && least() > memory) --threads;
     if (least() > memory)
       throw UsageError(
           fmt::format("the memory budget is too small: the {} index of level {} needs {} MiB more",
                       kind, level, (least() - memory) / kMiB + 1));
-    const IndexChunkBuilder builder(store, level, layout, *known, std::min(memory, kEnough),
-                                    threads);
+    const MakeIndexParts make =
+        known->builder(store, level, layout, std::min(memory, kEnough), threads);
     Workers workers(threads);
     progress.begin(fmt::format("verify {} index", kind),
                    static_cast<std::uint64_t>(volume(layout.bricks())));
     for_each_morton(layout.chunks(), [&](Int3 c) {
-      workers.execute([&] { check.run(c, builder); });
+      workers.execute([&] { check.run(c, make); });
       progress.advance(static_cast<std::uint64_t>(volume(layout.bricks_of_chunk(c).extent())));
     });
     progress.end();

@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include <isobrick/error.h>
+#include "surface/labels/label_value.h"
 #include "surface/labels/sheet_tables.h"
 
 namespace isobrick::inline v0 {
@@ -16,25 +17,6 @@ namespace {
 float squared_distance(Vec3f a, Vec3f b) {
   const Vec3f d = a - b;
   return dot(d, d);
-}
-
-/// The label that a sample is. Throws where it is no whole number.
-template <class T>
-std::int64_t label_of(T sample) {
-  if constexpr (std::is_floating_point_v<T>) {
-    constexpr T limit = T{2} / std::numeric_limits<T>::epsilon();
-    if (!(std::abs(sample) <= limit) || sample != std::trunc(sample))
-      throw Error(fmt::format(
-          "a sample is {}, and labels are whole numbers of at most {:.0f}: this is no label image",
-          sample, limit));
-  }
-  return static_cast<std::int64_t>(sample);
-}
-
-/// NaN has none.
-template <class T>
-bool has_label(T sample) {
-  return sample == sample;
 }
 
 /// Bits x of the samples of a row that differ from those at `other`.

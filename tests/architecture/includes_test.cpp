@@ -66,7 +66,7 @@ const std::map<std::string, Names> kPublicHeaders = {
     {"pipeline/export", {"export"}},
     {"pipeline/recode", {"recode"}},
     {"pipeline/extract", {"estimate", "extract", "index_choice"}},
-    {"pipeline/index", {"index_build"}},
+    {"pipeline/index", {"index_build", "label_index"}},
     {"pipeline/labels", {"label_pieces", "labels"}},
     {"pipeline/pieces", {"pieces"}},
     {"pipeline/sample", {"attributes"}},

@@ -122,6 +122,9 @@ def run_commands(check):
     check.run("extract_labels", "extract", "cells.zarr", "--labels", "all", "-o", "meshes",
               "--measure")
     check.validate("label_list", (folder / "meshes" / "labels.json").read_text(), "labels.json")
+    check.run("index", "index", "cells.zarr", "--kind", "labels")
+    check.run("info", "info", "cells.zarr")
+    check.run("extract_labels", "extract", "cells.zarr", "--labels", "3", "-o", "third")
     check.run("extract_labels", "extract", "cells.zarr", "--labels", "all", "-o", "resumed",
               "--resume")
     for _ in range(2):

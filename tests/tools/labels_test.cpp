@@ -248,6 +248,50 @@ TEST_F(LabelOption, SixtyFourBitLabels) {
                  {"big.nrrd", "72057598332895233", "y = 4, z = 1"});
 }
 
+TEST_F(LabelOption, ReadsTheBricksOfALabelByLists) {
+  const auto made = run_json({"index", store_, "--kind", "labels"});
+  EXPECT_EQ(made["kind"], "labels");
+  EXPECT_EQ(made["leaf"], 32);
+  EXPECT_GT(made["bytes"], 0);
+  expect_refused(run({"index", store_, "--kind", "labels"}), 2,
+                 {"labels index already", "--force"});
+  const auto info = run_json({"info", store_});
+  EXPECT_EQ(info["indexes"][0]["kind"], "labels");
+  EXPECT_NE(run({"info", store_}).out.find("labels, leaf 32"), std::string::npos);
+  EXPECT_NE(run({"verify", store_}).out.find("labels index"), std::string::npos);
+  const auto lists = extract({"--labels", "7", "-o", path("lists")});
+  const auto ranges = extract({"--labels", "7", "-o", path("ranges"), "--search", "linear"});
+  EXPECT_GT(lists["index_bytes"], 0);
+  EXPECT_EQ(ranges["index_bytes"], 0);
+  EXPECT_LT(lists["bricks"]["read"].get<int>(), ranges["bricks"]["read"].get<int>());
+  EXPECT_EQ(read_file(path("lists/7.ply")), read_file(path("ranges/7.ply")));
+  EXPECT_EQ(extract({"--labels", "all", "-o", path("all")})["index_bytes"], 0);
+  expect_refused(run({"extract", store_, "--labels", "7", "-o", path("a"), "--search", "octree"}),
+                 2, {"--search"});
+  expect_refused(
+      run({"extract", store_, "--isovalue", "7", "-o", path("a.ply"), "--search", "labels"}), 2,
+      {"unknown search 'labels'"});
+  expect_refused(run({"index", store_, "--kind", "labels", "--part", "1/2"}), 2, {"has no parts"});
+  expect_refused(run({"index", store_, "--kind", "labels", "--leaf", "4"}), 2, {"--leaf"});
+  expect_refused(run({"index", store_, "--kind", "labels", "--force", "--memory", "1M"}), 2,
+                 {"--memory"});
+  expect_refused(run({"index", store_, "--kind", "names"}), 2, {"unknown kind 'names'", "labels"});
+}
+
+TEST_F(LabelOption, ListsAreAddedByAConversion) {
+  const auto made = run_json(
+      {"convert", store_, path("listed.zarr"), "--brick", "16", "--build-index", "labels"});
+  EXPECT_GT(made["index_bytes"], 0);
+  EXPECT_EQ(run_json({"info", path("listed.zarr")})["indexes"][0]["kind"], "labels");
+  EXPECT_EQ(run({"verify", path("listed.zarr")}).exit_code, 0);
+  run_json({"extract", path("listed.zarr"), "--labels", "7", "-o", path("lists")});
+  extract({"--labels", "7", "-o", path("ranges")});
+  EXPECT_EQ(read_file(path("lists/7.ply")), read_file(path("ranges/7.ply")));
+  expect_refused(run({"synth", "cells", path("a.raw"), "--dims", "9,9,9", "--type", "u8",
+                      "--build-index", "labels"}),
+                 2, {"--build-index"});
+}
+
 TEST_F(LabelOption, ReplacesOnlyItsOwnFolder) {
   extract({"--labels", "7", "-o", path("out")});
   const Arguments again{"extract", store_, "--labels", "8", "-o", path("out")};
