@@ -233,7 +233,7 @@ WrittenLabels write_labels(const LabelOutput& output, const LabelListing& listin
   FolderOutput folder(output.folder, output.force, is_own_name);
   LabelWriter writer(output, listing, folder.folder());
   const LabelReport report =
-      make(writer.visits(), folder.folder(), [&](const LabelMesh& mesh) { writer.write(mesh); });
+      make(writer.visits(), folder.path(), [&](const LabelMesh& mesh) { writer.write(mesh); });
   writer.finish();
   folder.publish();
   return {report, writer.written(), writer.bytes()};

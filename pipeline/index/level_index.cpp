@@ -148,7 +148,7 @@ void build_index_chunk(const MakeIndexParts& make, const IndexLayout& layout,
   };
   std::vector<Waiting> waiting;
   std::unique_ptr<FileWriter> scratch;
-  bool has_directory = false;
+  bool has_directory = layout.kind == kLabelIndex;  // of labels it is the last part
   make(
       name.chunk,
       [&](std::vector<std::byte> part) { return encode_index_part(layout.zstd_level, part); },

@@ -305,5 +305,78 @@ TEST_F(KilledMesh, PartsAreAlwaysThoseOfTheirFile) {
   EXPECT_TRUE(seen_old && seen_new);
 }
 
+/// Cells in a store, in place of the raw files.
+class KilledLabels : public Killed {
+ protected:
+  void SetUp() override {
+    if (skipped_) GTEST_SKIP();
+    fs::remove(path("new.raw"));
+    fs::remove(path("old.raw"));
+    run_json({"synth", "cells", path("c.zarr"), "--dims", "40,40,40", "--type", "u8", "--brick",
+              "16", "--levels", "1"});
+  }
+};
+
+TEST_F(KilledLabels, ExtractionsGoOn) {
+  const Arguments extract{"extract",   path("c.zarr"), "--labels",  "1:9", "-o",
+                          path("out"), "--resume",     "--threads", "1",   "--json"};
+  succeeds(extract, -1);
+  const Tree expected = tree(path("out"));
+  ASSERT_GT(expected.size(), 5u);
+  fs::remove_all(path("out"));
+  int at = 0, kept = 0;
+  for (bool killed = true; killed; ++at) {
+    killed = run_until(at, extract);
+    if (fs::exists(path("out"))) {  // killed after all was there
+      EXPECT_EQ(tree(path("out")), expected) << at;
+      fs::remove_all(path("out"));
+    }
+    const Outcome again = run(extract);
+    ASSERT_EQ(again.exit_code, 0) << "killed at " << at << ": " << again.err;
+    kept += nlohmann::json::parse(again.out)["pieces"]["kept"].get<int>();
+    EXPECT_EQ(tree(path("out")), expected) << at;
+    expect_only({"c.zarr", "out"}, at);
+    fs::remove_all(path("out"));
+  }
+  EXPECT_GT(at, 2);
+  EXPECT_GT(kept, 0);
+}
+
+TEST_F(KilledLabels, PiecesAreMadeAnew) {
+  const Arguments part{"extract", path("c.zarr"), "--labels",      "all",       "--part",
+                       "1/2",     "-o",           path("a.piece"), "--threads", "1"};
+  succeeds(part, -1);
+  const std::string expected = read_file(path("a.piece"));
+  int at = 0;
+  for (bool killed = true; killed; ++at) {
+    fs::remove(path("a.piece"));
+    killed = run_until(at, part);
+    EXPECT_TRUE(!fs::exists(path("a.piece")) || read_file(path("a.piece")) == expected) << at;
+    succeeds(part, at);
+    EXPECT_TRUE(read_file(path("a.piece")) == expected) << at;
+    expect_only({"c.zarr", "a.piece"}, at);
+  }
+  EXPECT_GT(at, 1);
+}
+
+TEST_F(KilledLabels, ListsAreMadeWhole) {
+  const Arguments index{"index", path("c.zarr"), "--kind", "labels", "--threads", "1"};
+  const fs::path before = path("before.zarr");
+  fs::copy(path("c.zarr"), before, fs::copy_options::recursive);
+  succeeds(index, -1);
+  const Tree expected = tree(path("c.zarr"));
+  int at = 0;
+  for (bool killed = true; killed; ++at) {
+    copy_anew(before, path("c.zarr"));
+    killed = run_until(at, index);
+    EXPECT_EQ(run({"verify", path("c.zarr")}).exit_code, 0) << at;
+    Arguments again = index;
+    again.push_back("--resume");
+    succeeds(again, at);
+    EXPECT_EQ(tree(path("c.zarr")), expected) << at;
+  }
+  EXPECT_GT(at, 2);
+}
+
 }  // namespace
 }  // namespace isobrick::test
