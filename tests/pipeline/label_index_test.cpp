@@ -232,8 +232,11 @@ TEST_F(LabelIndex, DamageIsFound) {
     put(changed);
     EXPECT_GT(verify(path_of_last(), {}).damage_count, 0u) << at;
   }
+  // The directory is the last part, before the places of all parts and their checksum.
+  const std::size_t places = 16 * std::size_t{1 + 3 * 3 * 3} + 4;
   std::string changed = good;
-  changed[4] = static_cast<char>(changed[4] ^ 8);  // the directory is first
+  char& in_directory = changed[changed.size() - places - 8];
+  in_directory = static_cast<char>(in_directory ^ 8);
   put(changed);
   EXPECT_THROW(meshes_of(StoreReader(path_of_last()), {.labels = {{7, 7}}}), DamageError);
   EXPECT_NO_THROW(meshes_of(StoreReader(path_of_last()), {.labels = {{7, 7}}, .use_lists = false}));
