@@ -138,8 +138,6 @@ class LabelChunkBuilder::Chunk {
 };
 
 bool LabelChunkBuilder::Chunk::has_one_value(Int3 b) {
-  const StoreInfo& info = builder_.store_.info();
-  if (info.may_have_nan) return false;
   const Int3 blocks = ceil_div(layout_.cells(), {kBlockEdge, kBlockEdge, kBlockEdge});
   const RangeTable table = builder_.store_.block_ranges(
       builder_.level_,

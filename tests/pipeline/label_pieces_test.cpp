@@ -7,6 +7,10 @@
 
 #include <isobrick/error.h>
 #include <isobrick/pieces.h>
+#include "core/morton.h"
+#include "io/bytes/output_file.h"
+#include "pipeline/labels/label_piece_file.h"
+#include "pipeline/labels/label_spool.h"
 #include "tests/pipeline/labels_fixture.h"
 #include "tests/pipeline/least_budget.h"
 
@@ -302,6 +306,49 @@ TEST_F(LabelPieces, ThatAreDamagedAreRefused) {
     put_bytes(some[1], bytes.substr(0, size));
     EXPECT_NE(refusal<DamageError>(some).find("make it again"), std::string::npos);
   }
+}
+
+/// What a piece of right checksums may hold that no extraction writes.
+TEST_F(LabelPieces, OfImpossibleTilesAreRefused) {
+  const StoreReader reader = store(cells<std::uint8_t>({70, 60, 50}, 5, 3));
+  const fs::path path = folder_ / "a.piece";
+  extract_label_piece(reader, {}, {1, 2}, path);
+  const LabelPieceDescription description = LabelPieceReader(path).description();
+  ASSERT_GT(description.tiles.end, 1u);
+  extract_label_piece(reader, {}, {2, 2}, folder_ / "b.piece");
+  const LabelVertex vertex{TileCells::at(5, 5, 5), {0.5f, 0.5f, 0.5f}};
+  const ForeignVertex foreign{std::uint32_t{1} | std::uint32_t{TileCells::at(2, 5, 5)} << 3};
+  const LabelQuad good{0, 0, 0, 0}, bad{0, 0, 1, 0};
+  const auto packed = [&](Int3 tile, std::vector<ForeignVertex> of_others, const LabelQuad& quad) {
+    const LabelPiece piece{3, {&vertex, 1}, of_others, {&quad, 1}};
+    return LabelSpool::pack(tile, {&piece, 1});
+  };
+  const auto refused = [&](const std::vector<std::vector<std::byte>>& records) {
+    fs::remove(path);
+    OutputFile out(path.string(), true);
+    LabelPieceWriter writer(out.writer(), description);
+    for (const auto& record : records) writer.append(record);
+    writer.finish();
+    out.publish();
+    EXPECT_THROW(merge_label_pieces(Paths{path, folder_ / "b.piece"}, {},
+                                    [](const LabelMesh& mesh) {
+                                      isobrick::Mesh made;
+                                      MemorySink sink(made);
+                                      mesh.write(sink);
+                                    }),
+                 DamageError);
+  };
+  refused({packed({0, 0, 0}, {}, bad)});
+  refused({packed({0, 0, 0}, {}, {0, 0, ~std::uint32_t{0}, 0})});
+  refused({packed({1, 0, 0}, {}, good), packed({0, 0, 0}, {}, good)});
+  refused({packed(morton_decode(description.tiles.end), {}, good)});
+  // A neighbour that is not there, one without such a cell, and one without so many sheets.
+  refused({packed({0, 0, 0}, {foreign}, bad)});
+  refused({packed({0, 0, 0}, {foreign}, bad), packed({1, 0, 0}, {}, good)});
+  const LabelVertex first{TileCells::at(2, 5, 5), {}};
+  const LabelPiece neighbour{3, {&first, 1}, {}, {&good, 1}};
+  const ForeignVertex sheet{foreign.bits | std::uint32_t{8000} << 19};
+  refused({packed({0, 0, 0}, {sheet}, bad), LabelSpool::pack({1, 0, 0}, {&neighbour, 1})});
 }
 
 TEST_F(LabelPieces, AreMergedWithinABudget) {
