@@ -39,7 +39,7 @@ struct LabelOptions {
   /// Where some labels are chosen and the store has lists of labels (add_label_index()), only
   /// tiles that have one of them are looked at.
   bool use_lists = true;
-  int visits = 0;   ///< meshes that are passed on at the same time; 0: as many as threads
+  int visits = 0;  ///< meshes that are passed on at the same time; 0: as many as threads
   /// The file or folder beside which the scratch file lies; "-": in the folder of temporary files.
   std::filesystem::path scratch_beside = "-";
   /// Ends the operation with Cancelled, soon after a stop is requested on any thread.
