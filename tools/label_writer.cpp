@@ -120,7 +120,7 @@ class LabelWriter {
     }
     entry["triangles"] = size.triangles;
     if (const auto* levels = dynamic_cast<const LevelSink*>(sink.get()))
-      entry["levels"] = levels_json(levels->levels());
+      entry["levels"] = tools::levels_json(levels->levels());
     entry["vertices"] = has_vertices(format_) ? ordered_json(size.vertices) : ordered_json();
     const std::lock_guard lock(mutex_);
     written_.vertices += size.vertices;

@@ -27,12 +27,12 @@ constexpr Index kListedBrick = IndexLayout::kBrick;
 constexpr Index kListedBlocks = kListedBrick / kBlockEdge;
 
 /// The lists of a chunk in memory and packed, and those of the bricks under way.
-constexpr std::uint64_t kListBytes =
+constexpr std::uint64_t kLabelListBytes =
     4 * max_label_list_bytes(IndexLayout::kChunk * IndexLayout::kChunk * IndexLayout::kChunk);
 
 /// With pieces of so many index bricks along each edge.
 std::uint64_t memory_for(const Lattice& lattice, int threads, Index piece) {
-  return kProgramBytes + kListBytes + index_reading_bytes(lattice, threads) +
+  return kProgramBytes + kLabelListBytes + index_reading_bytes(lattice, threads) +
          index_piece_bytes(lattice, piece);
 }
 

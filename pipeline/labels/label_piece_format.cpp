@@ -83,7 +83,7 @@ std::string to_text(const LabelPieceDescription& description) {
 
 std::optional<LabelPieceDescription> parse_label_description(std::string_view text) try {
   const json object = json::parse(text);
-  LabelPieceDescription description{key_of(object), object.at("name").get<std::string>()};
+  LabelPieceDescription description{piece_key_of(object), object.at("name").get<std::string>()};
   description.level();
   description.image();
   description.properties();

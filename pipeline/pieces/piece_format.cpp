@@ -23,7 +23,7 @@ Vec3d vector_of(const json& v) {
 }
 
 PieceDescription header_of(const json& object) {
-  PieceDescription header{key_of(object), {}};
+  PieceDescription header{piece_key_of(object), {}};
   MeshHeader& of_mesh = header.of_mesh;
   of_mesh.has_normals = header.mesh.at("normals").get<bool>();
   of_mesh.world_lo = vector_of(object.at("volume").at(0));
@@ -37,7 +37,7 @@ PieceDescription header_of(const json& object) {
 
 }  // namespace
 
-PieceKey key_of(const json& object) {
+PieceKey piece_key_of(const json& object) {
   PieceKey key;
   key.part = {object.at("part").at(0).get<std::uint32_t>(),
               object.at("part").at(1).get<std::uint32_t>()};

@@ -82,7 +82,7 @@ std::uint64_t content_bytes(const PieceTile& tile, bool normals);
 /// As members of a description, and back. Throws nlohmann::json::exception or Error for what is no
 /// key.
 nlohmann::json to_json(const PieceKey& key);
-PieceKey key_of(const nlohmann::json& object);
+PieceKey piece_key_of(const nlohmann::json& object);
 
 /// The text of a header: one for each header.
 std::string to_text(const PieceDescription& header);
