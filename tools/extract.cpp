@@ -67,6 +67,7 @@ std::vector<Sinks> open_sinks(const std::vector<ExtractedSurface>& surfaces,
       of_surface.mesh =
           create_mesh_file(surface.output, {.format = surface.form.format,
                                             .quantize = surface.form.quantize,
+                                            .compress = surface.form.compress,
                                             .levels = surface.form.levels,
                                             .sharded = surface.form.sharded,
                                             .force = force,
@@ -338,6 +339,8 @@ void add_outputs(CLI::App* app, ExtractArguments& arguments) {
               "by its extension, or ply"});
   add_flag(app, "--quantize", arguments.quantize,
            "GLB with positions and normals of 16 bits (KHR_mesh_quantization)");
+  add_flag(app, "--compress", arguments.compress,
+           "GLB compressed without loss (EXT_meshopt_compression)");
   add_parsed(app, arguments.levels, parse_detail_levels,
              {"--levels", "auto|N",
               "Levels of detail of neuroglancer's format and 3D Tiles at most, each with a quarter "

@@ -89,6 +89,8 @@ void check_label_arguments(const ExtractArguments& arguments) {
     throw UsageError("PVTP has several files for a mesh; choose another --format for labels");
   if (arguments.quantize && arguments.format != MeshFormat::glb)
     throw UsageError("--quantize is for GLB only: add --format glb");
+  if (arguments.compress && arguments.format != MeshFormat::glb)
+    throw UsageError("--compress is for GLB only: add --format glb");
   check_levels(
       {.format = format_of(arguments), .levels = arguments.levels, .sharded = arguments.sharded});
 }
@@ -117,15 +119,19 @@ VisitPlan plan_visits(const ExtractArguments& arguments, const MeshFilterOptions
   std::uint64_t each = buffers + least;
   if (filter.any()) each += least;
   if (filter.simplifies()) each += simplification;
-  if (has_levels(format_of(arguments))) each += mesh_file_memory(format_of(arguments), 1, least);
+  if (has_levels(format_of(arguments)) || arguments.compress)
+    each +=
+        memory_of_file({.format = format_of(arguments), .compress = arguments.compress}, 1, least);
   // A quarter of the budget is that of the labels.
   const std::uint64_t budget =
       arguments.memory - arguments.memory / 4 - std::min(arguments.memory / 4, kProgramBytes);
-  if (has_levels(format_of(arguments)) && budget < each)
-    throw UsageError(fmt::format(
-        "a memory budget of {:.1f} MiB is too small for levels of detail: at least --memory {}M is "
-        "needed",
-        in_mib(arguments.memory), mib_above((each + kProgramBytes) / 3 * 4)));
+  const bool is_compressed = arguments.compress;
+  if ((has_levels(format_of(arguments)) || is_compressed) && budget < each)
+    throw UsageError(
+        fmt::format("a memory budget of {:.1f} MiB is too small for {}: at least --memory {}M is "
+                    "needed",
+                    in_mib(arguments.memory), is_compressed ? "--compress" : "levels of detail",
+                    mib_above((each + kProgramBytes) / 3 * 4)));
   VisitPlan plan;
   plan.visits = static_cast<int>(
       std::clamp<std::uint64_t>(budget / each, 1, static_cast<std::uint64_t>(threads)));
@@ -216,6 +222,7 @@ class LabelWriter {
     if (!levels_)
       return create_mesh_file(folder_ / name, {.format = format_,
                                                .quantize = arguments_.quantize,
+                                               .compress = arguments_.compress,
                                                .threads = 1,
                                                .memory = plan_.mesh_bytes});
     MeshProperties properties;

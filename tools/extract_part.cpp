@@ -27,6 +27,7 @@ void check_part_arguments(const ExtractArguments& arguments) {
       {!arguments.attributes.empty(), "--attribute"},
       {arguments.format.has_value(), "--format"},
       {arguments.quantize, "--quantize"},
+      {arguments.compress, "--compress"},
       {arguments.levels > 0, "--levels"},
       {arguments.sharded, "--sharded"},
       {arguments.for_print, "--preset"}};

@@ -46,6 +46,7 @@ fs::path default_output(const ExtractArguments& arguments, MeshFormat format, do
 /// How the mesh is written, or would be if it had a name.
 MeshForm form_of(const ExtractArguments& arguments) {
   MeshForm form = with_format({.quantize = arguments.quantize,
+                               .compress = arguments.compress,
                                .levels = arguments.levels,
                                .sharded = arguments.sharded,
                                .attributes = arguments.attributes.size()},
@@ -117,10 +118,10 @@ std::uint64_t filter_memory(const ExtractedSurface& surface) {
 /// The least budget of an extraction for the mesh of a surface.
 std::uint64_t min_of_mesh(const ExtractedSurface& surface, std::size_t surfaces,
                           const ExtractArguments& arguments, const StoreReader& store) {
-  return min_extract_memory(store, surface.options, Indexing::welded,
-                            filter_memory(surface) + surface.attribute_memory +
-                                mesh_file_memory(surface.form.format, arguments.threads,
-                                                 memory_of_mesh(surface, surfaces)));
+  return min_extract_memory(
+      store, surface.options, Indexing::welded,
+      filter_memory(surface) + surface.attribute_memory +
+          memory_of_file(surface.form, arguments.threads, memory_of_mesh(surface, surfaces)));
 }
 
 /// The same for its picture.
@@ -326,10 +327,9 @@ std::uint64_t memory_of_mesh(const ExtractedSurface& surface, std::size_t surfac
 }
 
 ExtractEstimate estimate_one(const ExtractedSurface& surface, const StoreReader& store) {
-  return estimate(
-      store, surface.options,
-      surface.attribute_memory +
-          mesh_file_memory(surface.form.format, surface.options.threads, surface.options.memory));
+  return estimate(store, surface.options,
+                  surface.attribute_memory + memory_of_file(surface.form, surface.options.threads,
+                                                            surface.options.memory));
 }
 
 void check_space(const std::vector<ExtractedSurface>& surfaces, const StoreReader& store,

@@ -25,8 +25,8 @@ struct ExtractArguments {
   std::string output;        ///< empty: by the input's name, unless nothing is to be written
   std::optional<Part> part;  ///< of the mesh, which becomes a piece; nothing: all of it
   PreviewRequest preview;
-  std::optional<MeshFormat> format;  ///< of the output; nothing: by its name
-  bool quantize = false;
+  std::optional<MeshFormat> format;         ///< of the output; nothing: by its name
+  bool quantize = false, compress = false;  ///< of GLB
   int levels = 0;        ///< of detail, of formats that have them; 0: by the mesh
   bool sharded = false;  ///< neuroglancer
   bool level_given = false;

@@ -27,7 +27,7 @@ struct MergeArguments {
   std::vector<std::string> pieces;
   std::string output;  ///< empty: by the name of the first piece
   std::optional<MeshFormat> format;
-  bool quantize = false;
+  bool quantize = false, compress = false;
   int levels = 0;
   bool sharded = false;
   FilterArguments filters;
@@ -46,6 +46,7 @@ fs::path default_output(const std::string& piece, MeshFormat format) {
 
 MeshForm form_of(const MergeArguments& arguments) {
   return with_format({.quantize = arguments.quantize,
+                      .compress = arguments.compress,
                       .levels = arguments.levels,
                       .sharded = arguments.sharded,
                       .attributes = arguments.attributes.size()},
@@ -85,6 +86,7 @@ MergeSinks open_sinks(const MergeJob& job, const PiecesInfo& info,
   MergeSinks sinks;
   sinks.file = create_mesh_file(job.output, {.format = job.form.format,
                                              .quantize = job.form.quantize,
+                                             .compress = job.form.compress,
                                              .levels = job.form.levels,
                                              .sharded = job.form.sharded,
                                              .force = job.force,
@@ -215,6 +217,8 @@ void add_merge(Program& program) {
               "by its extension, or ply"});
   add_flag(app, "--quantize", arguments->quantize,
            "GLB with positions and normals of 16 bits (KHR_mesh_quantization)");
+  add_flag(app, "--compress", arguments->compress,
+           "GLB compressed without loss (EXT_meshopt_compression)");
   add_parsed(app, arguments->levels, parse_detail_levels,
              {"--levels", "auto|N",
               "Levels of detail of neuroglancer's format and 3D Tiles at most", "auto"});

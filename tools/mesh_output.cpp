@@ -62,6 +62,11 @@ MeshFormat parse_mesh_format(const std::string& text) {
       text));
 }
 
+std::uint64_t memory_of_file(const MeshForm& form, int threads, std::uint64_t memory) {
+  return mesh_file_memory(form.format,
+                          {.compress = form.compress, .threads = threads, .memory = memory});
+}
+
 void check_levels(const MeshForm& form) {
   if (form.levels > 0 && !has_levels(form.format))
     throw UsageError(fmt::format(
@@ -84,6 +89,9 @@ MeshForm with_format(MeshForm form, const std::optional<MeshFormat>& named,
   if (form.quantize && form.format != MeshFormat::glb)
     throw UsageError(
         fmt::format("--quantize is for GLB only, and this mesh becomes {}", name_of(form.format)));
+  if (form.compress && form.format != MeshFormat::glb)
+    throw UsageError(
+        fmt::format("--compress is for GLB only, and this mesh becomes {}", name_of(form.format)));
   check_levels(form);
   check_attribute_format(form);
   return form;

@@ -42,6 +42,9 @@ inline constexpr int kMaxMeshLevels = 16;
 struct MeshFileOptions {
   std::optional<MeshFormat> format = {};  ///< nullopt: by the name's extension
   bool quantize = false;                  ///< GLB: 16 bits a number (KHR_mesh_quantization)
+  /// GLB: compressed without loss (EXT_meshopt_compression), beside `quantize` or alone. Throws
+  /// UsageError in a build without meshoptimizer.
+  bool compress = false;
   /// Of formats with levels of detail: how many at most, 1 to kMaxMeshLevels. Each has a quarter of
   /// the triangles of the one before. 0: until one part has the whole mesh.
   int levels = 0;
@@ -51,8 +54,8 @@ struct MeshFileOptions {
   /// Bytes of the whole operation's budget, of which the sink takes a small part
   /// (MeshSink::memory).
   std::uint64_t memory = std::uint64_t{1} << 30;
-  /// Of formats with levels of detail: hears of what takes long in finish(), within the stage of
-  /// the extraction. As MeshFilterOptions::progress.
+  /// Of formats with levels of detail and compressed GLB: hears of what takes long in finish(),
+  /// within the stage of the extraction. As MeshFilterOptions::progress.
   Progress* progress = nullptr;
 };
 
@@ -64,7 +67,7 @@ struct MeshFileOptions {
 ISOBRICK_API std::unique_ptr<MeshSink> create_mesh_file(const std::filesystem::path& path,
                                                         const MeshFileOptions& options);
 
-/// What MeshSink::memory() of such a mesh is.
-ISOBRICK_API std::uint64_t mesh_file_memory(MeshFormat format, int threads, std::uint64_t memory);
+/// What MeshSink::memory() of such a mesh is. MeshFileOptions::format is not looked at.
+ISOBRICK_API std::uint64_t mesh_file_memory(MeshFormat format, const MeshFileOptions& options);
 
 }  // namespace isobrick

@@ -73,7 +73,9 @@ void Mesh::save(const std::filesystem::path& path, const MeshFileOptions& option
 
 void Mesh::save(const std::filesystem::path& path, const MeshFileOptions& options,
                 Progress& progress) const {
-  const std::unique_ptr<MeshSink> sink = create_mesh_file(path, options);
+  MeshFileOptions heard = options;
+  if (!heard.progress) heard.progress = &progress;
+  const std::unique_ptr<MeshSink> sink = create_mesh_file(path, heard);
   const bool is_welded = sink->indexing() == Indexing::welded;
   progress.begin("saving", triangles.size() * sizeof(Triangle) +
                                (is_welded ? positions.size() * sizeof(Vec3f) : 0));

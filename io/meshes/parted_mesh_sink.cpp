@@ -51,6 +51,12 @@ std::uint64_t PartedMeshSink::bytes() const {
   return rows_.size() + triangles_.size() + part_bytes_ + out_.index().writer().size();
 }
 
+void PartedMeshSink::for_each_part(const std::function<void(const MeshPart&)>& take) {
+  const std::vector<MeshRun> runs = runs_.runs(size_);
+  for (std::size_t i = 0; i < runs.size(); ++i)
+    isobrick::for_each_part(stored_, i, runs[i], part_triangles_, take);
+}
+
 std::vector<std::uint32_t> PartedMeshSink::write_parts(
     std::string_view extension, int threads,
     const std::function<void(FileWriter&, const StoredMesh&, const MeshPart&)>& write_part) {
@@ -70,7 +76,7 @@ std::vector<std::uint32_t> PartedMeshSink::write_parts(
   std::atomic<std::uint64_t> written = 0;
   out_.parts_folder();
   const auto write_run = [&](std::size_t i) {
-    for_each_part(mesh, i, runs[i], part_triangles_, [&](const MeshPart& part) {
+    isobrick::for_each_part(mesh, i, runs[i], part_triangles_, [&](const MeshPart& part) {
       FileWriter out = out_.create_part(part_name(part.run, part.number, extension));
       write_part(out, mesh, part);
       out.finish();

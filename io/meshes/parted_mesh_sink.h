@@ -42,6 +42,8 @@ class PartedMeshSink : public MeshSink {
   /// What was written so far, to be read while the sink lives and its scratch files do.
   const StoredMesh& stored() const { return stored_; }
 
+  /// Calls take(part) for the parts of the mesh, in order.
+  void for_each_part(const std::function<void(const MeshPart&)>& take);
   /// Creates a file for each part of the mesh and calls write_part(file, mesh, part), on `threads`
   /// threads at a time; in order with one. Returns the number of parts of each run.
   std::vector<std::uint32_t> write_parts(

@@ -64,6 +64,7 @@ class Mesh:
         *,
         force: bool = False,
         quantize: bool = False,
+        compress: bool = False,
         levels: Optional[int] = None,
         sharded: bool = False,
         progress: _Progress = None,
@@ -250,6 +251,7 @@ class Extractor:
         progress: _Progress = None,
         force: bool = False,
         quantize: bool = False,
+        compress: bool = False,
     ) -> dict[str, Any]: ...
 
 def extract_labels(
@@ -516,6 +518,7 @@ class Volume:
         progress: _Progress = None,
         force: bool = False,
         quantize: bool = False,
+        compress: bool = False,
     ) -> dict[str, Any]: ...
     def extract_piece(
         self,
@@ -623,6 +626,7 @@ def merge(
     progress: _Progress = None,
     force: bool = False,
     quantize: bool = False,
+    compress: bool = False,
     levels: Optional[int] = None,
     sharded: bool = False,
 ) -> Mesh: ...
@@ -643,6 +647,7 @@ def merge(
     progress: _Progress = None,
     force: bool = False,
     quantize: bool = False,
+    compress: bool = False,
     levels: Optional[int] = None,
     sharded: bool = False,
 ) -> dict[str, Any]: ...

@@ -278,13 +278,15 @@ def filter_options(
 
 
 def mesh_file_options(
-    *, force=False, quantize=False, threads=0, memory=2**30, levels=None, sharded=False,
+    *, force=False, quantize=False, compress=False, threads=0, memory=2**30, levels=None,
+    sharded=False,
 ):
     options = _isobrick.MeshFileOptions()
     options.levels = 0 if levels is None else integer(levels, "levels", 1, 2**31 - 1)
     options.sharded = bool(sharded)
     options.force = bool(force)
     options.quantize = bool(quantize)
+    options.compress = bool(compress)
     options.threads = thread_count(threads)
     options.memory = byte_count(memory)
     return options

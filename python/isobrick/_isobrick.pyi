@@ -72,6 +72,7 @@ class MeshFilterOptions:
 
 class MeshFileOptions:
     quantize: bool
+    compress: bool
     levels: int
     sharded: bool
     force: bool

@@ -115,7 +115,8 @@ class Mesh:
         return f"<isobrick.Mesh: {', '.join(parts)}>"
 
     def save(
-        self, path, *, force=False, quantize=False, levels=None, sharded=False, progress=None,
+        self, path, *, force=False, quantize=False, compress=False, levels=None, sharded=False,
+        progress=None,
     ):
         """Writes a mesh file.
 
@@ -128,6 +129,8 @@ class Mesh:
             Replaces a file that exists; otherwise that is a UsageError.
         quantize : bool
             GLB only: 16 bits a coordinate.
+        compress : bool
+            GLB only: compressed without loss (EXT_meshopt_compression).
         levels : int, optional
             neuroglancer and 3D Tiles only: levels of detail at most; by default until one part has
             the whole mesh.
@@ -140,7 +143,7 @@ class Mesh:
         system refuses it.
         """
         options = mesh_file_options(
-            force=force, quantize=quantize, levels=levels, sharded=sharded
+            force=force, quantize=quantize, compress=compress, levels=levels, sharded=sharded
         )
         with reporting(progress) as report:
             self._native.save(path_text(path), options, report)

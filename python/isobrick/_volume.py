@@ -344,7 +344,7 @@ class Volume:
         drop_degenerate=False, topology="consistent", cap=False, min_component=0, largest=0,
         smooth=0, pass_band=0.1, simplify=None, max_error=None, measure=False, backend="auto",
         memory=2**30, threads=0, gpu_memory=0, device=0, progress=None, force=False,
-        quantize=False,
+        quantize=False, compress=False,
     ):
         """Streams a surface to a mesh file, so that volume and mesh may be larger than memory.
 
@@ -362,7 +362,9 @@ class Volume:
             drop_degenerate=drop_degenerate, topology=topology, cap=cap, backend=backend,
             memory=memory, threads=threads, gpu_memory=gpu_memory, device=device,
         )
-        file = mesh_file_options(force=force, quantize=quantize, threads=threads, memory=memory)
+        file = mesh_file_options(
+            force=force, quantize=quantize, compress=compress, threads=threads, memory=memory
+        )
         with reporting(progress) as report:
             return with_measure(
                 self._native.save_mesh(options, filters, path_text(path), file, report)

@@ -80,6 +80,9 @@ TEST_F(LabelOption, WritesEveryFormat) {
   EXPECT_TRUE(list("stl")["labels"][0]["vertices"].is_null());
   extract({"--labels", "7", "--format", "glb", "--quantize", "-o", path("small")});
   EXPECT_LT(fs::file_size(path("small/7.glb")), fs::file_size(path("glb/7.glb")));
+  if (!kCanCompress) return;
+  extract({"--labels", "7", "--format", "glb", "--compress", "-o", path("packed")});
+  EXPECT_LT(fs::file_size(path("packed/7.glb")), fs::file_size(path("small/7.glb")));
 }
 
 TEST_F(LabelOption, FiltersEachMesh) {
@@ -279,6 +282,7 @@ TEST_F(LabelOption, RefusesWhatMakesNoSense) {
   expect_refused(refused({"--labels", "all", "--level", "9"}), 2, {"level 9"});
   expect_refused(refused({"--labels", "all", "--format", "pvtp"}), 2, {"PVTP"});
   expect_refused(refused({"--labels", "all", "--quantize"}), 2, {"--format glb"});
+  expect_refused(refused({"--labels", "all", "--compress"}), 2, {"--format glb"});
   expect_refused(refused({"--labels", "all", "--memory", "20M"}), 2, {"--memory"});
   expect_refused(run({"extract", store_, "--labels", "all", "-o", path("a.ply")}), 2,
                  {"a folder with a mesh for each label"});
