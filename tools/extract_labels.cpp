@@ -219,15 +219,17 @@ class LabelWriter {
   }
 
   std::unique_ptr<MeshSink> open_sink(std::int64_t label, const std::string& name) {
+    MeshProperties properties;
+    if (const LabelProperties* known = find_properties(label))
+      properties = {known->name, known->colour};
     if (!levels_)
       return create_mesh_file(folder_ / name, {.format = format_,
                                                .quantize = arguments_.quantize,
                                                .compress = arguments_.compress,
+                                               .name = properties.name,
+                                               .colour = properties.colour,
                                                .threads = 1,
                                                .memory = plan_.mesh_bytes});
-    MeshProperties properties;
-    if (const LabelProperties* known = find_properties(label))
-      properties = {known->name, known->colour};
     return levels_->add_mesh(label,
                              {.levels = arguments_.levels,
                               .makes_normals = arguments_.normals != std::optional(false),

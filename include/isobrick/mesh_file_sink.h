@@ -50,7 +50,11 @@ struct MeshFileOptions {
   int levels = 0;
   bool sharded = false;  ///< neuroglancer: few large files
   bool force = false;    ///< replaces a file that exists
-  int threads = 0;       ///< that may help to write; 0: all cores
+  /// Of the mesh, for people: of a GLB its node and mesh, of an OBJ its object, of a PLY a comment.
+  std::string name = {};
+  /// Of the whole mesh, sRGB: of a GLB its material's, of an OBJ and a PLY all vertices'.
+  std::optional<VertexColour> colour = {};
+  int threads = 0;  ///< that may help to write; 0: all cores
   /// Bytes of the whole operation's budget, of which the sink takes a small part
   /// (MeshSink::memory).
   std::uint64_t memory = std::uint64_t{1} << 30;

@@ -34,6 +34,9 @@ GlbSink::GlbSink(std::string path, bool force, const GlbOptions& options)
       options_(options),
       vertices_{.quantized = options.quantize} {
   if (options.compress) check_meshopt();
+  vertices_.name = options.labelling.name;
+  if (const auto& colour = options.labelling.colour)
+    for (std::size_t i = 0; i < 3; ++i) vertices_.colour[i] = linear_light((*colour)[i]);
 }
 
 std::uint64_t GlbSink::memory_with(const GlbOptions& options) {
@@ -46,6 +49,8 @@ void GlbSink::begin(const MeshHeader& header) {
   vertices_.normals = header.has_normals;
   vertices_.unit = header.unit;
   vertices_.attributes = header.attributes;
+  vertices_.colours = header.has_colours;
+  keep_colours(header.has_colours ? sizeof(VertexColour) : 0);
 }
 
 void GlbSink::write(const MeshChunk& chunk) {
@@ -74,7 +79,7 @@ GlbPrimitive GlbSink::append_part(FileWriter& out, const StoredMesh& mesh, const
 void GlbSink::finish_whole(const GlbPrimitive& primitive) {
   FileWriter& out = output().index().writer();
   out.append(glb_start(glb_json(vertices_, {&primitive, 1}), primitive.bytes()));
-  if (vertices_.quantized)
+  if (vertices_.quantized || vertices_.colours)
     append_part(out, stored(), {.triangles = size().triangles, .own_vertices = size().vertices});
   else
     append_whole(out);

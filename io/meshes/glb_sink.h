@@ -7,6 +7,7 @@
 
 #include <isobrick/progress.h>
 #include "io/meshes/gltf/glb_scene.h"
+#include "io/meshes/mesh_labelling.h"
 #include "io/meshes/parted_mesh_sink.h"
 
 namespace isobrick::inline v0 {
@@ -16,6 +17,7 @@ struct GlbOptions {
   /// a grid whose step is the mesh's longest edge / 65535, so that no coordinate
   /// moves by more than half a step; normals are exact to 1.6e-5 a component.
   bool quantize = false;
+  MeshLabelling labelling = {};
   /// Without loss (EXT_meshopt_compression), in primitives of `part_triangles`; see GlbCompressor.
   bool compress = false;
   /// What does not fit one file of this size (the length in its header has 32

@@ -40,8 +40,15 @@ std::size_t waiting_memory(std::uint64_t memory) {
   return memory < 512 * mib ? 0 : static_cast<std::size_t>(std::min(memory / 8, 1024 * mib));
 }
 
+MeshLabelling labelling_of(const MeshFileOptions& options) {
+  return {options.name, options.colour};
+}
+
 GlbOptions glb_options(const MeshFileOptions& options) {
-  return {.quantize = options.quantize, .compress = options.compress, .progress = options.progress};
+  return {.quantize = options.quantize,
+          .labelling = labelling_of(options),
+          .compress = options.compress,
+          .progress = options.progress};
 }
 
 /// Throws UsageError for levels that the format has not.
@@ -107,9 +114,11 @@ std::unique_ptr<MeshSink> create_mesh_file(const std::filesystem::path& path,
   check_levels(*format, options);
   switch (*format) {
     case MeshFormat::ply:
-      return std::make_unique<PlySink>(name, force, waiting_memory(options.memory));
+      return std::make_unique<PlySink>(name, force, waiting_memory(options.memory),
+                                       labelling_of(options));
     case MeshFormat::stl: return std::make_unique<StlSink>(name, force);
-    case MeshFormat::obj: return std::make_unique<ObjSink>(name, force, options.threads);
+    case MeshFormat::obj:
+      return std::make_unique<ObjSink>(name, force, options.threads, labelling_of(options));
     case MeshFormat::glb: return std::make_unique<GlbSink>(name, force, glb_options(options));
     case MeshFormat::vtp:
       return std::make_unique<VtpSink>(name, force, waiting_memory(options.memory));

@@ -34,7 +34,7 @@ void PartedMeshSink::begin(const MeshHeader& header) {
 }
 
 void PartedMeshSink::write(const MeshChunk& chunk) {
-  append_rows(rows_, chunk);
+  append_rows(rows_, chunk, colour_bytes_);
   size_.vertices += chunk.positions.size();
   const auto add = [&](auto triangles) {
     runs_.add(size_.triangles, triangles);

@@ -52,6 +52,12 @@ class PartedMeshSink : public MeshSink {
   /// Appends the whole mesh: rows as append_rows() writes them, then triangles of UInt32.
   void append_whole(FileWriter& out);
 
+  /// Has the rows keep colours of so many bytes, after begin() and before anything is written.
+  void keep_colours(std::size_t bytes) {
+    colour_bytes_ = bytes;
+    stored_.row_bytes += bytes;
+  }
+
   /// Frees what scratch files take of the memory. They are not needed any more.
   void release_scratch() {
     rows_.release();
@@ -66,6 +72,7 @@ class PartedMeshSink : public MeshSink {
   RunFinder runs_;
   MeshSize size_;
   bool has_normals_ = false;
+  std::size_t colour_bytes_ = 0;
   std::string unit_;
   std::vector<std::string> attributes_;
 };

@@ -130,6 +130,17 @@ TEST_F(LabelOption, NamesAndColoursAreThoseOfTheImage) {
     EXPECT_EQ(labels[1]["name"], "left kidney");
     EXPECT_EQ(labels[1]["colour"], expected[1]["colour"]);
   }
+  const auto kidney = [&](const std::string& format) {
+    run_json({"extract", path("seg.zarr"), "--labels", "3", "--format", format, "-o",
+              path("in_" + format)});
+    return read_file(path("in_" + format) + "/3." + format);
+  };
+  const std::string ply = kidney("ply"), glb = kidney("glb");
+  EXPECT_NE(ply.find("comment name left kidney\n"), ply.npos);
+  EXPECT_NE(ply.find("property uchar red\n"), ply.npos);
+  EXPECT_NE(kidney("obj").find("\no left kidney\nv "), std::string::npos);
+  EXPECT_NE(glb.find(R"("nodes":[{"name":"left kidney","mesh":0)"), glb.npos);
+  EXPECT_NE(glb.find(R"("baseColorFactor":[0.2159,0.0,1.0,1])"), glb.npos);
   EXPECT_TRUE(run_json({"info", make_store("a")})["labels"].is_null());
   EXPECT_EQ(run_json({"info", store_})["labels"], nlohmann::json::array());
 }

@@ -42,6 +42,20 @@ Quantized signed_fractions(Vec3f v) {
   return fractions;
 }
 
+/// In linear light, and the opacity.
+using LinearColour = std::array<std::uint16_t, 4>;
+
+LinearColour linear_colour(VertexColour colour) {
+  static const std::array<std::uint16_t, 256> table = [] {
+    std::array<std::uint16_t, 256> values{};
+    for (std::size_t i = 0; i < values.size(); ++i)
+      values[i] = static_cast<std::uint16_t>(
+          std::lround(linear_light(static_cast<std::uint8_t>(i)) * 65535));
+    return values;
+  }();
+  return {table[colour[0]], table[colour[1]], table[colour[2]], 65535};
+}
+
 ordered_json triple(Vec3f v) {
   // Every float is a double, whose shortest decimals the JSON holds.
   return {double{v.x}, double{v.y}, double{v.z}};
@@ -60,7 +74,9 @@ std::string attribute_name(std::string name) {
 
 /// The node of the mesh, which leads to metres.
 ordered_json node_of(const GlbVertices& vertices) {
-  ordered_json node{{"mesh", 0}};
+  ordered_json node;
+  if (!vertices.name.empty()) node["name"] = vertices.name;
+  node["mesh"] = 0;
   const double metres = unit_ratio(vertices.unit, "meter").value_or(1);
   const double scale = metres * (vertices.quantized ? vertices.step : 1);
   const Vec3d origin = vertices.quantized ? vertices.origin * metres : Vec3d{};
@@ -191,6 +207,12 @@ void Lists::add(const GlbVertices& form, const GlbPrimitive& primitive) {
 
 }  // namespace
 
+double linear_light(std::uint8_t srgb) {
+  const double value = srgb / 255.0;
+  const double linear = value <= 0.04045 ? value / 12.92 : std::pow((value + 0.055) / 1.055, 2.4);
+  return std::round(linear * 1e4) / 1e4;
+}
+
 void Bounds3f::include(std::span<const Vec3f> positions) {
   if (positions.empty()) return;
   if (std::exchange(empty, false)) lo = hi = positions.front();
@@ -215,11 +237,12 @@ std::size_t GlbVertices::vector_bytes() const {
 }
 
 std::size_t GlbVertices::float_row_bytes() const {
-  return (normals ? 2 : 1) * sizeof(Vec3f) + attributes.size() * sizeof(float);
+  return (normals ? 2 : 1) * sizeof(Vec3f) + attributes.size() * sizeof(float) +
+         (colours ? sizeof(VertexColour) : 0);
 }
 
 std::size_t GlbVertices::row_bytes() const {
-  return vector_bytes() + attributes.size() * sizeof(float);
+  return vector_bytes() + attributes.size() * sizeof(float) + (colours ? sizeof(LinearColour) : 0);
 }
 
 std::vector<GlbField> GlbVertices::fields() const {
@@ -232,12 +255,19 @@ std::vector<GlbField> GlbVertices::fields() const {
                     .bytes = vector,
                     .component = quantized ? kInt16 : kFloat,
                     .normalized = quantized});
-  for (const std::string& name : attributes)
-    list.push_back({.name = attribute_name(name),
+  for (const std::string& attribute : attributes)
+    list.push_back({.name = attribute_name(attribute),
                     .offset = list.back().offset + list.back().bytes,
                     .bytes = sizeof(float),
                     .component = kFloat,
                     .type = "SCALAR"});
+  if (colours)
+    list.push_back({.name = "COLOR_0",
+                    .offset = list.back().offset + list.back().bytes,
+                    .bytes = sizeof(LinearColour),
+                    .component = kUint16,
+                    .type = "VEC4",
+                    .normalized = true});
   return list;
 }
 
@@ -272,8 +302,8 @@ Bounds3f GlbVertices::stored(const Bounds3f& bounds) const {
 }
 
 Bounds3f GlbVertices::store(std::span<const std::byte> rows, std::byte* to) const {
-  const std::size_t from_bytes = float_row_bytes();
-  const std::size_t from_vectors = from_bytes - attributes.size() * sizeof(float);
+  const std::size_t from_bytes = float_row_bytes(), numbers = attributes.size() * sizeof(float);
+  const std::size_t from_vectors = (normals ? 2 : 1) * sizeof(Vec3f);
   const std::size_t count = rows.size() / from_bytes;
   Bounds3f bounds;
   for (std::size_t i = 0; i < count; ++i, to += row_bytes()) {
@@ -288,7 +318,12 @@ Bounds3f GlbVertices::store(std::span<const std::byte> rows, std::byte* to) cons
     } else {
       std::memcpy(to, row.data(), vector_bytes());
     }
-    std::memcpy(to + vector_bytes(), from + from_vectors, from_bytes - from_vectors);
+    std::memcpy(to + vector_bytes(), from + from_vectors, numbers);
+    if (!colours) continue;
+    VertexColour srgb;
+    std::memcpy(&srgb, from + from_vectors + numbers, sizeof(srgb));
+    const LinearColour linear = linear_colour(srgb);
+    std::memcpy(to + vector_bytes() + numbers, linear.data(), sizeof(linear));
   }
   return bounds;
 }
@@ -315,12 +350,17 @@ std::string glb_json(const GlbVertices& vertices, std::span<const GlbPrimitive> 
   Lists lists;
   for (const GlbPrimitive& primitive : primitives) lists.add(vertices, primitive);
   scene["nodes"] = ordered_json::array({node_of(vertices)});
-  scene["materials"] = ordered_json::array({material(vertices.colour)});
-  scene["meshes"] = ordered_json::array({{{"primitives", std::move(lists.primitives)}}});
+  scene["materials"] = ordered_json::array(
+      {material(vertices.colours ? std::array<double, 3>{1, 1, 1} : vertices.colour)});
+  ordered_json mesh;
+  if (!vertices.name.empty()) mesh["name"] = vertices.name;
+  mesh["primitives"] = std::move(lists.primitives);
+  scene["meshes"] = ordered_json::array({std::move(mesh)});
   scene["accessors"] = std::move(lists.accessors);
   scene["bufferViews"] = std::move(lists.views);
   scene["buffers"] = std::move(lists.buffers);
-  return scene.dump();
+  // Names may come from files of others.
+  return scene.dump(-1, ' ', false, ordered_json::error_handler_t::replace);
 }
 
 std::string glb_start(std::string json, std::uint64_t buffer_bytes) {

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include <isobrick/mesh.h>
 #include <isobrick/vec.h>
 #include "io/bytes/output_file.h"
 
@@ -44,6 +45,10 @@ struct GlbVertices {
   /// Names of vertex attributes, which become custom ones in capitals: "_TEMPERATURE". Their floats
   /// end each row.
   std::vector<std::string> attributes = {};
+  /// Colours of vertices (COLOR_0), in linear light of 16 bits. Before they are stored, four bytes
+  /// of sRGB end each row. The material is white then.
+  bool colours = false;
+  std::string name = {};  ///< of the node and of the mesh; empty: none
 
   /// The grid that covers `bounds`.
   void set_grid(const Bounds3f& bounds);
@@ -84,6 +89,10 @@ struct GlbPrimitive {
   /// Bytes of it as vertices and triangles.
   std::uint64_t bytes() const { return vertex_bytes + triangles * 3 * sizeof(std::uint32_t); }
 };
+
+/// A part of sRGB as one of linear light, to four decimals, which are the same with every math
+/// library.
+double linear_light(std::uint8_t srgb);
 
 /// The scene's JSON. Either all primitives are compressed or none is.
 std::string glb_json(const GlbVertices& vertices, std::span<const GlbPrimitive> primitives);
