@@ -67,6 +67,7 @@ void check_label_arguments(const ExtractArguments& arguments) {
       {!arguments.preview.path.empty(), "--preview"},
       {arguments.estimate, "--estimate"},
       {!arguments.attributes.empty(), "--attribute"},
+      {!arguments.colours.attribute.empty(), "--colour-by"},
       {arguments.cap, "--cap"},
       {arguments.for_print, "--preset"},
       {arguments.drop_degenerate, "--drop-degenerate"},

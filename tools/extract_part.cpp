@@ -25,6 +25,7 @@ void check_part_arguments(const ExtractArguments& arguments) {
   const std::pair<bool, const char*> of_merge[] = {
       {filter_options(arguments.filters).any(), "a filter, --measure or --mesh-unit"},
       {!arguments.attributes.empty(), "--attribute"},
+      {!arguments.colours.attribute.empty(), "--colour-by"},
       {arguments.format.has_value(), "--format"},
       {arguments.quantize, "--quantize"},
       {arguments.compress, "--compress"},

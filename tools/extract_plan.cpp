@@ -49,7 +49,8 @@ MeshForm form_of(const ExtractArguments& arguments) {
                                .compress = arguments.compress,
                                .levels = arguments.levels,
                                .sharded = arguments.sharded,
-                               .attributes = arguments.attributes.size()},
+                               .attributes = arguments.attributes.size(),
+                               .colours = !arguments.colours.attribute.empty()},
                               arguments.format, arguments.output);
   form.normals = arguments.normals.value_or(has_normals(form.format));
   return form;
@@ -245,9 +246,8 @@ std::string shortage_text(const PlannedMesh& mesh, const Shortage& shortage, boo
 
 /// Refuses attributes that no file could hold.
 void check_attributes(const ExtractArguments& arguments) {
-  const std::vector<std::string> names = names_of(arguments.attributes);
-  check_attribute_names(names);
-  if (!names.empty() && !arguments.estimate && !arguments.writes_mesh())
+  check_attributes(arguments.attributes, arguments.colours);
+  if (!arguments.attributes.empty() && !arguments.estimate && !arguments.writes_mesh())
     throw UsageError("--attribute: a picture has none; name a mesh with -o");
 }
 

@@ -37,6 +37,7 @@ struct ExtractArguments {
   std::optional<bool> normals;  ///< nothing: where the format holds them
   FilterArguments filters;
   std::vector<AttributeRequest> attributes;
+  ColourRequest colours;
   std::uint64_t attribute_memory = 0;  ///< that sampling them takes, of each surface
   bool drop_degenerate = false;
   Topology topology = Topology::consistent;

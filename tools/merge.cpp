@@ -32,6 +32,7 @@ struct MergeArguments {
   bool sharded = false;
   FilterArguments filters;
   std::vector<AttributeRequest> attributes;
+  ColourRequest colours;
   std::uint64_t memory = 0;
   int threads = 0;
   bool force = false, no_space_check = false;
@@ -49,7 +50,8 @@ MeshForm form_of(const MergeArguments& arguments) {
                       .compress = arguments.compress,
                       .levels = arguments.levels,
                       .sharded = arguments.sharded,
-                      .attributes = arguments.attributes.size()},
+                      .attributes = arguments.attributes.size(),
+                      .colours = !arguments.colours.attribute.empty()},
                      arguments.format, arguments.output);
 }
 
@@ -77,7 +79,7 @@ std::uint64_t filter_memory(const MergeJob& job, const PiecesInfo& info, std::ui
 /// The mesh with what it goes through.
 struct MergeSinks {
   std::unique_ptr<MeshSink> file;
-  std::unique_ptr<AttributeSink> attributes;  ///< null without any
+  AttributeSinks attributes;
   std::unique_ptr<MeshFilter> filter;
 };
 
@@ -99,11 +101,8 @@ MergeSinks open_sinks(const MergeJob& job, const PiecesInfo& info,
   filter.scratch_beside = job.output;
   filter.progress = &progress;
   MeshSink* output = sinks.file.get();
-  if (!attributes.empty()) {
-    sinks.attributes = std::make_unique<AttributeSink>(*output, attributes.attributes(),
-                                                       attributes.options(job.memory, 1));
-    output = sinks.attributes.get();
-  }
+  sinks.attributes = attributes.open(*output, attributes.options(job.memory, 1));
+  if (sinks.attributes.attributes) output = sinks.attributes.attributes.get();
   filter.memory = filter_memory(job, info, output->memory());
   sinks.filter = std::make_unique<MeshFilter>(*output, filter);
   return sinks;
@@ -151,12 +150,13 @@ int run_merge(const MergeArguments& arguments, Console& console) {
   MergeJob job{.form = form_of(arguments),
                .filter = filter_options(arguments.filters),
                .attributes = arguments.attributes,
+               .colours = arguments.colours,
                .memory = arguments.memory,
                .threads = arguments.threads,
                .force = arguments.force,
                .no_space_check = arguments.no_space_check};
   check_filters(arguments.filters, false);
-  check_attribute_names(names_of(arguments.attributes));
+  check_attributes(arguments.attributes, arguments.colours);
   job.pieces.assign(arguments.pieces.begin(), arguments.pieces.end());
   job.output = !arguments.output.empty()
                    ? fs::path(has_levels(job.form.format) ? without_slash(arguments.output)
@@ -177,7 +177,7 @@ MergeResult merge(MergeJob job, Console& console) {
   inputs.insert(inputs.end(), job.pieces.begin(), job.pieces.end());
   check_replaces_no_input(job.output, inputs);
   check_disk(job, made.pieces);
-  const AttributeVolumes attributes(job.attributes, {}, job.memory, job.threads,
+  const AttributeVolumes attributes(job.attributes, job.colours, {}, job.memory, job.threads,
                                     made.pieces.header.unit, console);
   const MergeSinks sinks = open_sinks(job, made.pieces, attributes, console.progress());
   {
@@ -224,7 +224,7 @@ void add_merge(Program& program) {
               "Levels of detail of neuroglancer's format and 3D Tiles at most", "auto"});
   add_flag(app, "--sharded", arguments->sharded, "neuroglancer's format in few large files");
   add_filters(app, arguments->filters);
-  add_attributes(app, arguments->attributes);
+  add_attributes(app, arguments->attributes, arguments->colours);
   add_memory(app, arguments->memory);
   add_threads(app, arguments->threads);
   add_force(app, arguments->force);

@@ -41,6 +41,11 @@ void check_attribute_format(const MeshForm& form) {
         fmt::format("--attribute: {} cannot hold attributes of vertices; choose PLY, VTP, PVTP or "
                     "GLB",
                     name_of(form.format)));
+  if (form.colours && form.format != MeshFormat::ply && form.format != MeshFormat::glb)
+    throw UsageError(fmt::format(
+        "--colour-by is for GLB and PLY, and this mesh becomes {}, whose readers colour "
+        "by the attribute itself",
+        name_of(form.format)));
 }
 
 }  // namespace

@@ -18,6 +18,7 @@ struct MeshForm {
   int levels = 0;              ///< of detail; 0: by the mesh
   bool sharded = false;        ///< neuroglancer only
   std::size_t attributes = 0;  ///< a float each at a vertex
+  bool colours = false;        ///< of vertices; PLY and GLB only
 };
 
 /// By the name's extension; PLY on standard output. Throws UsageError for any other.

@@ -31,7 +31,9 @@ async function trianglesOf(name) {
     const { index, attributes } = mesh.geometry;
     const numbers = Object.values(attributes);
     const corner = (i) =>
-      numbers.map((of) => [of.getX(i), of.getY(i), of.getZ(i)].join()).join();
+      numbers
+        .map((of) => Array.from({ length: of.itemSize }, (_, k) => of.getComponent(i, k)).join())
+        .join();
     for (let i = 0; i < index.count; i += 3) {
       const corners = [0, 1, 2].map((k) => corner(index.getX(i + k)));
       const first = corners.indexOf([...corners].sort()[0]);
