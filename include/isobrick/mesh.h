@@ -89,6 +89,10 @@ struct ISOBRICK_API Mesh {
   /// The same with reports of progress. What `progress` throws ends it and leaves no file.
   void save(const std::filesystem::path& path, const MeshFileOptions& options,
             Progress& progress) const;
+  /// The same with vertex attributes, by names as of check_attribute_names(). Throws UsageError
+  /// where one has not a value a vertex, or the format holds none.
+  void save(const std::filesystem::path& path, const MeshFileOptions& options, Progress& progress,
+            std::span<const VertexAttribute> attributes) const;
 };
 
 /// Of what a mesh consists.

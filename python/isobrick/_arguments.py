@@ -277,6 +277,12 @@ def filter_options(
     return options
 
 
+def attribute_name(name):
+    if not isinstance(name, str):
+        raise TypeError(f"the name of an attribute must be a text, not {name!r}")
+    return name
+
+
 def mesh_file_options(
     *, force=False, quantize=False, compress=False, threads=0, memory=2**30, levels=None,
     sharded=False,
