@@ -79,6 +79,11 @@ pkg_check_modules(draco QUIET IMPORTED_TARGET draco)
 isobrick_found_option(ISOBRICK_DRACO "Write neuroglancer's meshes" "${draco_FOUND}" Draco
   "neuroglancer's meshes cannot be written")
 
+# Compressed GLB.
+find_package(meshoptimizer QUIET)
+isobrick_found_option(ISOBRICK_MESHOPT "Write and read compressed GLB" "${meshoptimizer_FOUND}" meshoptimizer
+  "GLB cannot be compressed")
+
 # Stores behind URLs. 7.85 has the options by name of protocols.
 find_package(CURL 7.85 QUIET)
 isobrick_found_option(ISOBRICK_CURL "Read stores from URLs" "${CURL_FOUND}" libcurl

@@ -27,11 +27,13 @@ using nlohmann::ordered_json;
 /// The files of one surface; null where none was requested.
 struct Sinks {
   std::unique_ptr<MeshSink> mesh, preview;
-  std::unique_ptr<AttributeSink> attributes;  ///< before the mesh; null without attributes
+  AttributeSinks attributes;                                ///< before the mesh
   std::unique_ptr<MeshFilter> mesh_filter, preview_filter;  ///< before them; null without filters
 
   /// What the filters write to: the attributes are of the vertices that leave them.
-  MeshSink* mesh_file() const { return attributes ? attributes.get() : mesh.get(); }
+  MeshSink* mesh_file() const {
+    return attributes.attributes ? attributes.attributes.get() : mesh.get();
+  }
   MeshSink* mesh_input() const { return mesh_filter ? mesh_filter.get() : mesh_file(); }
   MeshSink* preview_input() const { return preview_filter ? preview_filter.get() : preview.get(); }
   /// Before what the report is of.
@@ -67,16 +69,16 @@ std::vector<Sinks> open_sinks(const std::vector<ExtractedSurface>& surfaces,
       of_surface.mesh =
           create_mesh_file(surface.output, {.format = surface.form.format,
                                             .quantize = surface.form.quantize,
+                                            .compress = surface.form.compress,
                                             .levels = surface.form.levels,
                                             .sharded = surface.form.sharded,
                                             .force = force,
                                             .threads = arguments.threads,
                                             .memory = memory_of_mesh(surface, surfaces.size()),
                                             .progress = is_only ? &progress : nullptr});
-    if (of_surface.mesh && !attributes.empty())
+    if (of_surface.mesh)
       of_surface.attributes =
-          std::make_unique<AttributeSink>(*of_surface.mesh, attributes.attributes(),
-                                          attributes.options(arguments.memory, surfaces.size()));
+          attributes.open(*of_surface.mesh, attributes.options(arguments.memory, surfaces.size()));
     if (!surface.preview.empty())
       of_surface.preview = open_preview(surface.preview.string(), force, arguments.preview);
     MeshFilterOptions filter = surface.filter;
@@ -226,9 +228,9 @@ int run_extract(const ExtractArguments& given, Console& console) {
   const OpenedVolume input = open_shared_input(arguments, job, console);
   const StoreReader& store = input.store();
   choose_mesh_unit(arguments, store, console);
-  const AttributeVolumes attributes(arguments.attributes, arguments.input, arguments.memory,
-                                    arguments.threads, store.info().levels.front().transform.unit,
-                                    console);
+  const AttributeVolumes attributes(arguments.attributes, arguments.colours, arguments.input,
+                                    arguments.memory, arguments.threads,
+                                    store.info().levels.front().transform.unit, console);
   arguments.attribute_memory =
       attributes.memory(attributes.options(arguments.memory, arguments.isovalues.size()));
   const std::vector<ExtractedSurface> surfaces = plan_surfaces(arguments, store, console);
@@ -319,6 +321,8 @@ void add_outputs(CLI::App* app, ExtractArguments& arguments) {
               "by its extension, or ply"});
   add_flag(app, "--quantize", arguments.quantize,
            "GLB with positions and normals of 16 bits (KHR_mesh_quantization)");
+  add_flag(app, "--compress", arguments.compress,
+           "GLB compressed without loss (EXT_meshopt_compression)");
   add_parsed(app, arguments.levels, parse_detail_levels,
              {"--levels", "auto|N",
               "Levels of detail of neuroglancer's format and 3D Tiles at most, each with a quarter "
@@ -391,7 +395,7 @@ void add_extract(Program& program) {
            "Close the surface at the border of the volume or region and around missing samples (on "
            "the CPU)");
   add_filters(app, arguments->filters);
-  add_attributes(app, arguments->attributes);
+  add_attributes(app, arguments->attributes, arguments->colours);
   add_text(
       app,
       {"--preset", "print",

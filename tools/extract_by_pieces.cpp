@@ -253,6 +253,7 @@ MergeResult put_together(const ExtractArguments& arguments, const ExtractedSurfa
                   .form = surface.form,
                   .filter = surface.filter,
                   .attributes = arguments.attributes,
+                  .colours = arguments.colours,
                   .memory = arguments.memory,
                   .threads = arguments.threads,
                   .force = arguments.force,

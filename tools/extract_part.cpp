@@ -70,8 +70,10 @@ void check_part_arguments(const ExtractArguments& arguments) {
   const std::pair<bool, const char*> of_merge[] = {
       {filter_options(filters).any(), "a filter, --measure or --mesh-unit"},
       {!arguments.attributes.empty(), "--attribute"},
+      {!arguments.colours.attribute.empty(), "--colour-by"},
       {arguments.format.has_value(), "--format"},
       {arguments.quantize, "--quantize"},
+      {arguments.compress, "--compress"},
       {arguments.levels > 0, "--levels"},
       {arguments.sharded, "--sharded"},
       {arguments.labels && arguments.normals, "--normals"},

@@ -46,9 +46,11 @@ fs::path default_output(const ExtractArguments& arguments, MeshFormat format, do
 /// How the mesh is written, or would be if it had a name.
 MeshForm form_of(const ExtractArguments& arguments) {
   MeshForm form = with_format({.quantize = arguments.quantize,
+                               .compress = arguments.compress,
                                .levels = arguments.levels,
                                .sharded = arguments.sharded,
-                               .attributes = arguments.attributes.size()},
+                               .attributes = arguments.attributes.size(),
+                               .colours = !arguments.colours.attribute.empty()},
                               arguments.format, arguments.output);
   form.normals = arguments.normals.value_or(has_normals(form.format));
   return form;
@@ -117,10 +119,10 @@ std::uint64_t filter_memory(const ExtractedSurface& surface) {
 /// The least budget of an extraction for the mesh of a surface.
 std::uint64_t min_of_mesh(const ExtractedSurface& surface, std::size_t surfaces,
                           const ExtractArguments& arguments, const StoreReader& store) {
-  return min_extract_memory(store, surface.options, Indexing::welded,
-                            filter_memory(surface) + surface.attribute_memory +
-                                mesh_file_memory(surface.form.format, arguments.threads,
-                                                 memory_of_mesh(surface, surfaces)));
+  return min_extract_memory(
+      store, surface.options, Indexing::welded,
+      filter_memory(surface) + surface.attribute_memory +
+          memory_of_file(surface.form, arguments.threads, memory_of_mesh(surface, surfaces)));
 }
 
 /// The same for its picture.
@@ -244,9 +246,8 @@ std::string shortage_text(const PlannedMesh& mesh, const Shortage& shortage, boo
 
 /// Refuses attributes that no file could hold.
 void check_attributes(const ExtractArguments& arguments) {
-  const std::vector<std::string> names = names_of(arguments.attributes);
-  check_attribute_names(names);
-  if (!names.empty() && !arguments.estimate && !arguments.writes_mesh())
+  check_attributes(arguments.attributes, arguments.colours);
+  if (!arguments.attributes.empty() && !arguments.estimate && !arguments.writes_mesh())
     throw UsageError("--attribute: a picture has none; name a mesh with -o");
 }
 
@@ -326,10 +327,9 @@ std::uint64_t memory_of_mesh(const ExtractedSurface& surface, std::size_t surfac
 }
 
 ExtractEstimate estimate_one(const ExtractedSurface& surface, const StoreReader& store) {
-  return estimate(
-      store, surface.options,
-      surface.attribute_memory +
-          mesh_file_memory(surface.form.format, surface.options.threads, surface.options.memory));
+  return estimate(store, surface.options,
+                  surface.attribute_memory + memory_of_file(surface.form, surface.options.threads,
+                                                            surface.options.memory));
 }
 
 void check_space(const std::vector<ExtractedSurface>& surfaces, const StoreReader& store,

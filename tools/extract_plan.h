@@ -25,8 +25,8 @@ struct ExtractArguments {
   std::string output;        ///< empty: by the input's name, unless nothing is to be written
   std::optional<Part> part;  ///< of the mesh, which becomes a piece; nothing: all of it
   PreviewRequest preview;
-  std::optional<MeshFormat> format;  ///< of the output; nothing: by its name
-  bool quantize = false;
+  std::optional<MeshFormat> format;         ///< of the output; nothing: by its name
+  bool quantize = false, compress = false;  ///< of GLB
   int levels = 0;        ///< of detail, of formats that have them; 0: by the mesh
   bool sharded = false;  ///< neuroglancer
   bool level_given = false;
@@ -37,6 +37,7 @@ struct ExtractArguments {
   std::optional<bool> normals;  ///< nothing: where the format holds them
   FilterArguments filters;
   std::vector<AttributeRequest> attributes;
+  ColourRequest colours;
   std::uint64_t attribute_memory = 0;  ///< that sampling them takes, of each surface
   bool drop_degenerate = false;
   Topology topology = Topology::consistent;

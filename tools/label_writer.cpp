@@ -56,15 +56,17 @@ VisitPlan plan_visits(const LabelOutput& output, const MeshFilterOptions& filter
   std::uint64_t each = buffers + least;
   if (filter.any()) each += least;
   if (filter.simplifies()) each += simplification;
-  if (has_levels(output.mesh_format())) each += mesh_file_memory(output.mesh_format(), 1, least);
+  if (has_levels(output.mesh_format()) || output.compress)
+    each += memory_of_file({.format = output.mesh_format(), .compress = output.compress}, 1, least);
   // A quarter of the budget is that of the labels.
   const std::uint64_t budget =
       output.memory - output.memory / 4 - std::min(output.memory / 4, kProgramBytes);
-  if (has_levels(output.mesh_format()) && budget < each)
-    throw UsageError(fmt::format(
-        "a memory budget of {:.1f} MiB is too small for levels of detail: at least --memory {}M is "
-        "needed",
-        in_mib(output.memory), mib_above((each + kProgramBytes) / 3 * 4)));
+  if ((has_levels(output.mesh_format()) || output.compress) && budget < each)
+    throw UsageError(
+        fmt::format("a memory budget of {:.1f} MiB is too small for {}: at least --memory {}M is "
+                    "needed",
+                    in_mib(output.memory), output.compress ? "--compress" : "levels of detail",
+                    mib_above((each + kProgramBytes) / 3 * 4)));
   VisitPlan plan;
   plan.visits = static_cast<int>(
       std::clamp<std::uint64_t>(budget / each, 1, static_cast<std::uint64_t>(threads)));
@@ -152,14 +154,17 @@ class LabelWriter {
   }
 
   std::unique_ptr<MeshSink> open_sink(std::int64_t label, const std::string& name) {
-    if (!levels_)
-      return create_mesh_file(folder_ / name, {.format = format_,
-                                               .quantize = output_.quantize,
-                                               .threads = 1,
-                                               .memory = plan_.mesh_bytes});
     MeshProperties properties;
     if (const LabelProperties* known = find_properties(label))
       properties = {known->name, known->colour};
+    if (!levels_)
+      return create_mesh_file(folder_ / name, {.format = format_,
+                                               .quantize = output_.quantize,
+                                               .compress = output_.compress,
+                                               .name = properties.name,
+                                               .colour = properties.colour,
+                                               .threads = 1,
+                                               .memory = plan_.mesh_bytes});
     return levels_->add_mesh(
         label, {.levels = output_.levels, .makes_normals = output_.normals, .threads = 1},
         properties);
@@ -216,6 +221,8 @@ void check_label_output(const LabelOutput& output) {
     throw UsageError("PVTP has several files for a mesh; choose another --format for labels");
   if (output.quantize && output.format != MeshFormat::glb)
     throw UsageError("--quantize is for GLB only: add --format glb");
+  if (output.compress && output.format != MeshFormat::glb)
+    throw UsageError("--compress is for GLB only: add --format glb");
   check_levels(
       {.format = output.mesh_format(), .levels = output.levels, .sharded = output.sharded});
 }

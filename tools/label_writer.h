@@ -18,7 +18,7 @@ namespace isobrick::tools {
 struct LabelOutput {
   std::string folder;
   std::optional<MeshFormat> format;  ///< nothing: by the folder's name, else PLY
-  bool quantize = false;
+  bool quantize = false, compress = false;
   int levels = 0;  ///< of detail, of formats that have them; 0: by the mesh
   bool sharded = false;
   bool normals = true;      ///< of formats with levels

@@ -29,12 +29,13 @@ struct MergeArguments {
   std::vector<std::string> pieces;
   std::string output;  ///< empty: by the name of the first piece
   std::optional<MeshFormat> format;
-  bool quantize = false;
+  bool quantize = false, compress = false;
   int levels = 0;
   bool sharded = false;
   FilterArguments filters;
   bool normals = true;
   std::vector<AttributeRequest> attributes;
+  ColourRequest colours;
   std::uint64_t memory = 0;
   int threads = 0;
   bool force = false, no_space_check = false;
@@ -53,9 +54,11 @@ fs::path default_output(const std::string& piece, MeshFormat format) {
 
 MeshForm form_of(const MergeArguments& arguments) {
   return with_format({.quantize = arguments.quantize,
+                      .compress = arguments.compress,
                       .levels = arguments.levels,
                       .sharded = arguments.sharded,
-                      .attributes = arguments.attributes.size()},
+                      .attributes = arguments.attributes.size(),
+                      .colours = !arguments.colours.attribute.empty()},
                      arguments.format, arguments.output);
 }
 
@@ -83,7 +86,7 @@ std::uint64_t filter_memory(const MergeJob& job, const PiecesInfo& info, std::ui
 /// The mesh with what it goes through.
 struct MergeSinks {
   std::unique_ptr<MeshSink> file;
-  std::unique_ptr<AttributeSink> attributes;  ///< null without any
+  AttributeSinks attributes;
   std::unique_ptr<MeshFilter> filter;
 };
 
@@ -92,6 +95,7 @@ MergeSinks open_sinks(const MergeJob& job, const PiecesInfo& info,
   MergeSinks sinks;
   sinks.file = create_mesh_file(job.output, {.format = job.form.format,
                                              .quantize = job.form.quantize,
+                                             .compress = job.form.compress,
                                              .levels = job.form.levels,
                                              .sharded = job.form.sharded,
                                              .force = job.force,
@@ -104,11 +108,8 @@ MergeSinks open_sinks(const MergeJob& job, const PiecesInfo& info,
   filter.scratch_beside = job.output;
   filter.progress = &progress;
   MeshSink* output = sinks.file.get();
-  if (!attributes.empty()) {
-    sinks.attributes = std::make_unique<AttributeSink>(*output, attributes.attributes(),
-                                                       attributes.options(job.memory, 1));
-    output = sinks.attributes.get();
-  }
+  sinks.attributes = attributes.open(*output, attributes.options(job.memory, 1));
+  if (sinks.attributes.attributes) output = sinks.attributes.attributes.get();
   filter.memory = filter_memory(job, info, output->memory());
   sinks.filter = std::make_unique<MeshFilter>(*output, filter);
   return sinks;
@@ -153,9 +154,13 @@ std::string merge_text(const MergeJob& job, const MergeResult& made) {
 
 /// Pieces of labels become a folder.
 int run_merge_labels(const MergeArguments& arguments, Console& console) {
-  if (!arguments.attributes.empty())
-    throw UsageError(
-        "--attribute is for isosurfaces, and these are pieces of labels: leave it out");
+  const std::pair<bool, const char*> of_isosurfaces[] = {
+      {!arguments.attributes.empty(), "--attribute"},
+      {!arguments.colours.attribute.empty(), "--colour-by"}};
+  for (const auto& [is_given, name] : of_isosurfaces)
+    if (is_given)
+      throw UsageError(
+          fmt::format("{} is for isosurfaces, and these are pieces of labels: leave it out", name));
   if (arguments.filters.smooth > 0)
     throw UsageError(
         "meshes of labels are smoothed together, in their pieces: give --smooth to 'isobrick "
@@ -164,6 +169,7 @@ int run_merge_labels(const MergeArguments& arguments, Console& console) {
                                                         : arguments.output,
                      .format = arguments.format,
                      .quantize = arguments.quantize,
+                     .compress = arguments.compress,
                      .levels = arguments.levels,
                      .sharded = arguments.sharded,
                      .normals = arguments.normals,
@@ -210,13 +216,14 @@ int run_merge(const MergeArguments& arguments, Console& console) {
   MergeJob job{.form = form_of(arguments),
                .filter = filter_options(arguments.filters),
                .attributes = arguments.attributes,
+               .colours = arguments.colours,
                .memory = arguments.memory,
                .threads = arguments.threads,
                .normals = arguments.normals,
                .force = arguments.force,
                .no_space_check = arguments.no_space_check};
   check_filters(arguments.filters, false);
-  check_attribute_names(names_of(arguments.attributes));
+  check_attributes(arguments.attributes, arguments.colours);
   job.pieces.assign(arguments.pieces.begin(), arguments.pieces.end());
   job.output = !arguments.output.empty()
                    ? fs::path(has_levels(job.form.format) ? without_slash(arguments.output)
@@ -237,7 +244,7 @@ MergeResult merge(MergeJob job, Console& console) {
   inputs.insert(inputs.end(), job.pieces.begin(), job.pieces.end());
   check_replaces_no_input(job.output, inputs);
   check_disk(job, made.pieces);
-  const AttributeVolumes attributes(job.attributes, {}, job.memory, job.threads,
+  const AttributeVolumes attributes(job.attributes, job.colours, {}, job.memory, job.threads,
                                     made.pieces.header.unit, console);
   const MergeSinks sinks = open_sinks(job, made.pieces, attributes, console.progress());
   {
@@ -277,6 +284,8 @@ void add_merge(Program& program) {
               "by its extension, or ply"});
   add_flag(app, "--quantize", arguments->quantize,
            "GLB with positions and normals of 16 bits (KHR_mesh_quantization)");
+  add_flag(app, "--compress", arguments->compress,
+           "GLB compressed without loss (EXT_meshopt_compression)");
   add_parsed(app, arguments->levels, parse_detail_levels,
              {"--levels", "auto|N",
               "Levels of detail of neuroglancer's format and 3D Tiles at most", "auto"});
@@ -285,7 +294,7 @@ void add_merge(Program& program) {
       app, arguments->normals, parse_normals,
       {"--normals", "gradient|none", "none: without those that the pieces have", "gradient"});
   add_filters(app, arguments->filters);
-  add_attributes(app, arguments->attributes);
+  add_attributes(app, arguments->attributes, arguments->colours);
   add_memory(app, arguments->memory);
   add_threads(app, arguments->threads);
   add_force(app, arguments->force);

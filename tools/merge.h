@@ -21,6 +21,7 @@ struct MergeJob {
   MeshForm form;
   MeshFilterOptions filter;
   std::vector<AttributeRequest> attributes;
+  ColourRequest colours = {};
   std::uint64_t memory = 0;
   int threads = 0;
   bool normals = true;  ///< false: without those that the pieces have

@@ -41,6 +41,11 @@ void check_attribute_format(const MeshForm& form) {
         fmt::format("--attribute: {} cannot hold attributes of vertices; choose PLY, VTP, PVTP or "
                     "GLB",
                     name_of(form.format)));
+  if (form.colours && form.format != MeshFormat::ply && form.format != MeshFormat::glb)
+    throw UsageError(fmt::format(
+        "--colour-by is for GLB and PLY, and this mesh becomes {}, whose readers colour "
+        "by the attribute itself",
+        name_of(form.format)));
 }
 
 }  // namespace
@@ -60,6 +65,11 @@ MeshFormat parse_mesh_format(const std::string& text) {
   throw UsageError(fmt::format(
       "'{}' is no format of a mesh; it is ply, stl, obj, glb, vtp, pvtp, neuroglancer or 3dtiles",
       text));
+}
+
+std::uint64_t memory_of_file(const MeshForm& form, int threads, std::uint64_t memory) {
+  return mesh_file_memory(form.format,
+                          {.compress = form.compress, .threads = threads, .memory = memory});
 }
 
 void check_levels(const MeshForm& form) {
@@ -84,6 +94,9 @@ MeshForm with_format(MeshForm form, const std::optional<MeshFormat>& named,
   if (form.quantize && form.format != MeshFormat::glb)
     throw UsageError(
         fmt::format("--quantize is for GLB only, and this mesh becomes {}", name_of(form.format)));
+  if (form.compress && form.format != MeshFormat::glb)
+    throw UsageError(
+        fmt::format("--compress is for GLB only, and this mesh becomes {}", name_of(form.format)));
   check_levels(form);
   check_attribute_format(form);
   return form;

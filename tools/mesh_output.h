@@ -14,15 +14,20 @@ struct MeshForm {
   MeshFormat format = MeshFormat::ply;
   bool normals = false;
   bool quantize = false;       ///< 16 bits a number; GLB only
+  bool compress = false;       ///< GLB only
   int levels = 0;              ///< of detail; 0: by the mesh
   bool sharded = false;        ///< neuroglancer only
   std::size_t attributes = 0;  ///< a float each at a vertex
+  bool colours = false;        ///< of vertices; PLY and GLB only
 };
 
 /// By the name's extension; PLY on standard output. Throws UsageError for any other.
 MeshFormat mesh_format(const std::filesystem::path& path);
 /// By a word such as "ply". Throws UsageError for any other.
 MeshFormat parse_mesh_format(const std::string& text);
+
+/// What the file of such a mesh holds of a budget; see MeshSink::memory().
+std::uint64_t memory_of_file(const MeshForm& form, int threads, std::uint64_t memory);
 
 /// Throws UsageError for levels of detail and shards that the format has not.
 void check_levels(const MeshForm& form);

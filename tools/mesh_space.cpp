@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include <isobrick/error.h>
@@ -19,7 +20,10 @@ MeshBytes predict_bytes(const MeshForm& form, MeshSize size) {
   // What waits in scratch files is on the disk twice for a moment.
   switch (form.format) {
     case MeshFormat::stl: return {header + t * 50, header + t * 50};
-    case MeshFormat::ply: return {header + rows + t * 13, header + rows + 2 * t * 13};
+    case MeshFormat::ply: {
+      const std::uint64_t file = header + rows + (form.colours ? 3 * v : 0) + t * 13;
+      return {file, file + t * 13};
+    }
     case MeshFormat::obj: {
       // As long as such lines are mostly; decimals end where they are exact.
       constexpr std::uint64_t vertex_line = 22, normal_line = 34;
@@ -30,9 +34,18 @@ MeshBytes predict_bytes(const MeshForm& form, MeshSize size) {
       return {header + vertices + faces, header + vertices + 2 * faces};
     }
     case MeshFormat::glb: {
+      const std::uint64_t colours = form.colours ? 8 * v : 0, waiting = rows + colours / 2;
+      if (form.compress) {
+        // As much as noisy surfaces take; smooth ones take less.
+        const std::uint64_t position = form.quantize ? 4 : 6, normal = form.quantize ? 6 : 10;
+        const std::uint64_t file =
+            header + v * (position + (vectors - 1) * normal) + attributes + colours + 2 * t;
+        return {file, file + std::max(waiting + t * triangle, file)};
+      }
       const std::uint64_t stored =
           form.quantize ? v * vectors * quantized_vector + attributes : rows;
-      return {header + stored + t * triangle, header + stored + rows + 2 * t * triangle};
+      const std::uint64_t file = header + stored + colours + t * triangle;
+      return {file, file + waiting + t * triangle};
     }
     case MeshFormat::vtp: {
       const std::uint64_t file = header + form.attributes * declaration + rows + t * (triangle + 4);

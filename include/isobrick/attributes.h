@@ -65,6 +65,45 @@ struct SampledAttribute {
 /// nx, red, Normals, ...); two that differ in nothing but the case of letters; more than 32.
 ISOBRICK_API void check_attribute_names(std::span<const std::string> names);
 
+/// Scales of colours. `viridis` is even to the eye, also without red or green; `coolwarm` has its
+/// light middle between blue and red, for values on both sides of a mean.
+enum class ColourMap : std::uint8_t { viridis, coolwarm, grey };
+
+/// How the values of an attribute become colours.
+struct AttributeColours {
+  std::string attribute;  ///< its name
+  double low = 0;         ///< the value with the first colour, which smaller ones have, too
+  double high = 1;        ///< the value with the last; not `low`, but it may be below it
+  ColourMap map = ColourMap::viridis;
+
+  /// The colour of a value; grey of NaN.
+  ISOBRICK_API VertexColour colour_of(float value) const;
+};
+
+/// Passes a mesh with vertex attributes on to another sink, with the colours of one of them. It
+/// goes behind an AttributeSink.
+class ISOBRICK_API ColourSink final : public MeshSink {
+ public:
+  /// `sink` must outlive it. Throws UsageError where both ends of the scale are the same or one is
+  /// not finite.
+  ColourSink(MeshSink& sink, AttributeColours colours);
+
+  Indexing indexing() const override { return sink_.indexing(); }
+  bool takes_wide() const override { return sink_.takes_wide(); }
+  /// Throws UsageError for a mesh without the attribute.
+  void begin(const MeshHeader& header) override;
+  void write(const MeshChunk& chunk) override;
+  void finish() override { sink_.finish(); }
+  std::uint64_t bytes() const override { return sink_.bytes(); }
+  std::uint64_t memory() const override { return sink_.memory(); }
+
+ private:
+  MeshSink& sink_;
+  AttributeColours colours_;
+  std::size_t attribute_ = 0;
+  std::vector<VertexColour> of_chunk_;
+};
+
 /// Passes a mesh on to another sink, with vertex attributes that are samples of volumes at its
 /// vertices: see VolumeSampler. It goes behind the filters, so that the values are those of the
 /// vertices that leave. The values depend on nothing but the positions and the volumes.

@@ -47,7 +47,7 @@ struct MeshChunk {
   std::span<const Vec3f> positions;            ///< of the vertices
   std::span<const Vec3f> normals;              ///< unit length, outward; empty or one a position
   std::span<const Triangle> triangles;         ///< numbered by MeshSink::indexing()
-  std::span<const VertexColour> colours = {};  ///< of meshes of others; empty or one a position
+  std::span<const VertexColour> colours = {};  ///< empty or one a position
   /// Those of MeshHeader::attributes, in that order.
   std::span<const VertexAttribute> attributes = {};
   /// In place of `triangles` where MeshHeader::wide says so.
@@ -89,6 +89,10 @@ struct ISOBRICK_API Mesh {
   /// The same with reports of progress. What `progress` throws ends it and leaves no file.
   void save(const std::filesystem::path& path, const MeshFileOptions& options,
             Progress& progress) const;
+  /// The same with vertex attributes, by names as of check_attribute_names(). Throws UsageError
+  /// where one has not a value a vertex, or the format holds none.
+  void save(const std::filesystem::path& path, const MeshFileOptions& options, Progress& progress,
+            std::span<const VertexAttribute> attributes) const;
 };
 
 /// Of what a mesh consists.
@@ -117,6 +121,8 @@ struct MeshHeader {
   /// The mesh has more vertices than 32 bits number, and chunks have `wide_triangles`. Only for
   /// sinks that take them.
   bool wide = false;
+  /// Whether every chunk has colours. PLY, OBJ and GLB hold them; others ignore them.
+  bool has_colours = false;
 };
 
 /// Takes a mesh chunk by chunk. Calls come from one thread at a time, in order.

@@ -42,17 +42,24 @@ inline constexpr int kMaxMeshLevels = 16;
 struct MeshFileOptions {
   std::optional<MeshFormat> format = {};  ///< nullopt: by the name's extension
   bool quantize = false;                  ///< GLB: 16 bits a number (KHR_mesh_quantization)
+  /// GLB: compressed without loss (EXT_meshopt_compression), beside `quantize` or alone. Throws
+  /// UsageError in a build without meshoptimizer.
+  bool compress = false;
   /// Of formats with levels of detail: how many at most, 1 to kMaxMeshLevels. Each has a quarter of
   /// the triangles of the one before. 0: until one part has the whole mesh.
   int levels = 0;
   bool sharded = false;  ///< neuroglancer: few large files
   bool force = false;    ///< replaces a file that exists
-  int threads = 0;       ///< that may help to write; 0: all cores
+  /// Of the mesh, for people: of a GLB its node and mesh, of an OBJ its object, of a PLY a comment.
+  std::string name = {};
+  /// Of the whole mesh, sRGB: of a GLB its material's, of an OBJ and a PLY all vertices'.
+  std::optional<VertexColour> colour = {};
+  int threads = 0;  ///< that may help to write; 0: all cores
   /// Bytes of the whole operation's budget, of which the sink takes a small part
   /// (MeshSink::memory).
   std::uint64_t memory = std::uint64_t{1} << 30;
-  /// Of formats with levels of detail: hears of what takes long in finish(), within the stage of
-  /// the extraction. As MeshFilterOptions::progress.
+  /// Of formats with levels of detail and compressed GLB: hears of what takes long in finish(),
+  /// within the stage of the extraction. As MeshFilterOptions::progress.
   Progress* progress = nullptr;
 };
 
@@ -64,7 +71,7 @@ struct MeshFileOptions {
 ISOBRICK_API std::unique_ptr<MeshSink> create_mesh_file(const std::filesystem::path& path,
                                                         const MeshFileOptions& options);
 
-/// What MeshSink::memory() of such a mesh is.
-ISOBRICK_API std::uint64_t mesh_file_memory(MeshFormat format, int threads, std::uint64_t memory);
+/// What MeshSink::memory() of such a mesh is. MeshFileOptions::format is not looked at.
+ISOBRICK_API std::uint64_t mesh_file_memory(MeshFormat format, const MeshFileOptions& options);
 
 }  // namespace isobrick

@@ -1,7 +1,11 @@
 #include <isobrick/mesh.h>
 
 #include <algorithm>
+#include <vector>
 
+#include <fmt/format.h>
+
+#include <isobrick/error.h>
 #include <isobrick/mesh_file_sink.h>
 #include <isobrick/progress.h>
 
@@ -38,18 +42,32 @@ void for_each_part(std::size_t size, std::size_t bytes, Progress& progress, F&& 
   }
 }
 
+using Attributes = std::span<const VertexAttribute>;
+
+/// Those of vertices [begin, begin + count).
+std::vector<VertexAttribute> part_of(Attributes attributes, std::size_t begin, std::size_t count) {
+  std::vector<VertexAttribute> part;
+  for (const VertexAttribute& attribute : attributes)
+    part.push_back({attribute.name, attribute.values.subspan(begin, count)});
+  return part;
+}
+
 /// Vertices first, so that triangles may name any of them.
-void write_welded(const Mesh& mesh, MeshSink& sink, Progress& progress) {
+void write_welded(const Mesh& mesh, Attributes attributes, MeshSink& sink, Progress& progress) {
   for_each_part(
       mesh.positions.size(), sizeof(Vec3f), progress, [&](std::size_t i, std::size_t count) {
         MeshChunk chunk{.first_vertex = i, .positions = mesh.positions.span().subspan(i, count)};
         if (!mesh.normals.empty()) chunk.normals = mesh.normals.span().subspan(i, count);
+        const std::vector<VertexAttribute> of_chunk = part_of(attributes, i, count);
+        chunk.attributes = of_chunk;
         sink.write(chunk);
       });
+  const std::vector<VertexAttribute> none = part_of(attributes, 0, 0);
   for_each_part(mesh.triangles.size(), sizeof(Triangle), progress,
                 [&](std::size_t i, std::size_t count) {
                   sink.write({.first_vertex = mesh.positions.size(),
-                              .triangles = mesh.triangles.span().subspan(i, count)});
+                              .triangles = mesh.triangles.span().subspan(i, count),
+                              .attributes = none});
                 });
 }
 
@@ -63,6 +81,18 @@ void write_unwelded(const Mesh& mesh, MeshSink& sink, Progress& progress) {
                 });
 }
 
+void check_attributes(const Mesh& mesh, Attributes attributes, const std::filesystem::path& path,
+                      const MeshFileOptions& options) {
+  for (const VertexAttribute& attribute : attributes)
+    if (attribute.values.size() != mesh.positions.size())
+      throw UsageError(fmt::format("the attribute '{}' has {} values, and the mesh {} vertices",
+                                   attribute.name, attribute.values.size(), mesh.positions.size()));
+  const auto format = options.format ? options.format : find_mesh_format(path.extension().string());
+  if (!attributes.empty() && format && !has_attributes(*format))
+    throw UsageError(fmt::format(
+        "{} cannot hold attributes of vertices; choose PLY, VTP, PVTP or GLB", name_of(*format)));
+}
+
 }  // namespace
 
 void Mesh::save(const std::filesystem::path& path) const { save(path, {}); }
@@ -73,13 +103,24 @@ void Mesh::save(const std::filesystem::path& path, const MeshFileOptions& option
 
 void Mesh::save(const std::filesystem::path& path, const MeshFileOptions& options,
                 Progress& progress) const {
-  const std::unique_ptr<MeshSink> sink = create_mesh_file(path, options);
+  save(path, options, progress, {});
+}
+
+void Mesh::save(const std::filesystem::path& path, const MeshFileOptions& options,
+                Progress& progress, std::span<const VertexAttribute> attributes) const {
+  check_attributes(*this, attributes, path, options);
+  MeshFileOptions heard = options;
+  if (!heard.progress) heard.progress = &progress;
+  const std::unique_ptr<MeshSink> sink = create_mesh_file(path, heard);
   const bool is_welded = sink->indexing() == Indexing::welded;
   progress.begin("saving", triangles.size() * sizeof(Triangle) +
                                (is_welded ? positions.size() * sizeof(Vec3f) : 0));
-  sink->begin(header_of_mesh(*this));
+  MeshHeader header = header_of_mesh(*this);
+  for (const VertexAttribute& attribute : attributes)
+    header.attributes.emplace_back(attribute.name);
+  sink->begin(header);
   if (is_welded)
-    write_welded(*this, *sink, progress);
+    write_welded(*this, attributes, *sink, progress);
   else
     write_unwelded(*this, *sink, progress);
   progress.end();

@@ -9,7 +9,6 @@
 #include <isobrick/error.h>
 #include "io/meshes/glb_sink.h"
 #include "io/meshes/levels/level_folder.h"
-#include "io/meshes/mesh_parts.h"
 #include "io/meshes/obj_sink.h"
 #include "io/meshes/ply_sink.h"
 #include "io/meshes/stl_sink.h"
@@ -39,6 +38,17 @@ constexpr std::array<NamedFormat, 8> kFormats{
 std::size_t waiting_memory(std::uint64_t memory) {
   constexpr std::uint64_t mib = std::uint64_t{1} << 20;
   return memory < 512 * mib ? 0 : static_cast<std::size_t>(std::min(memory / 8, 1024 * mib));
+}
+
+MeshLabelling labelling_of(const MeshFileOptions& options) {
+  return {options.name, options.colour};
+}
+
+GlbOptions glb_options(const MeshFileOptions& options) {
+  return {.quantize = options.quantize,
+          .labelling = labelling_of(options),
+          .compress = options.compress,
+          .progress = options.progress};
 }
 
 /// Throws UsageError for levels that the format has not.
@@ -104,11 +114,12 @@ std::unique_ptr<MeshSink> create_mesh_file(const std::filesystem::path& path,
   check_levels(*format, options);
   switch (*format) {
     case MeshFormat::ply:
-      return std::make_unique<PlySink>(name, force, waiting_memory(options.memory));
+      return std::make_unique<PlySink>(name, force, waiting_memory(options.memory),
+                                       labelling_of(options));
     case MeshFormat::stl: return std::make_unique<StlSink>(name, force);
-    case MeshFormat::obj: return std::make_unique<ObjSink>(name, force, options.threads);
-    case MeshFormat::glb:
-      return std::make_unique<GlbSink>(name, force, GlbOptions{.quantize = options.quantize});
+    case MeshFormat::obj:
+      return std::make_unique<ObjSink>(name, force, options.threads, labelling_of(options));
+    case MeshFormat::glb: return std::make_unique<GlbSink>(name, force, glb_options(options));
     case MeshFormat::vtp:
       return std::make_unique<VtpSink>(name, force, waiting_memory(options.memory));
     case MeshFormat::pvtp:
@@ -126,16 +137,17 @@ std::unique_ptr<MeshSink> create_mesh_file(const std::filesystem::path& path,
   throw UsageError("no such format of a mesh");
 }
 
-std::uint64_t mesh_file_memory(MeshFormat format, int threads, std::uint64_t memory) {
+std::uint64_t mesh_file_memory(MeshFormat format, const MeshFileOptions& options) {
   switch (format) {
     case MeshFormat::ply:
-    case MeshFormat::vtp: return waiting_memory(memory);
-    case MeshFormat::obj: return ObjSink::memory_with(threads);
-    case MeshFormat::glb: return part_memory(GlbOptions{}.part_triangles);
-    case MeshFormat::pvtp: return PvtpSink::memory_with(PvtpSink::threads_within(threads, memory));
+    case MeshFormat::vtp: return waiting_memory(options.memory);
+    case MeshFormat::obj: return ObjSink::memory_with(options.threads);
+    case MeshFormat::glb: return GlbSink::memory_with(glb_options(options));
+    case MeshFormat::pvtp:
+      return PvtpSink::memory_with(PvtpSink::threads_within(options.threads, options.memory));
     case MeshFormat::neuroglancer:
     case MeshFormat::tiles3d:
-      return level_memory({.threads = threads, .memory = level_share(memory)});
+      return level_memory({.threads = options.threads, .memory = level_share(options.memory)});
     default: return 0;
   }
 }

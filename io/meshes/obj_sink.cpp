@@ -7,6 +7,7 @@
 #include <charconv>
 #include <memory>
 #include <span>
+#include <utility>
 #include <vector>
 
 namespace isobrick::inline v0 {
@@ -15,7 +16,7 @@ namespace {
 /// Items that one task turns into text.
 constexpr std::size_t kBatch = 2048;
 /// The longest line of a vertex: "-1.17549435e-38" is 15 characters.
-constexpr std::size_t kVertexText = 2 * (3 + 3 * 16) + 2;
+constexpr std::size_t kVertexText = 2 * (3 + 3 * 16) + 2 + 3 * 16;
 /// The longest line of a face: six numbers of up to 14 digits.
 constexpr std::size_t kFaceText = 2 + 3 * (2 * 14 + 3);
 constexpr std::size_t kBatchText = kBatch * std::max(kVertexText, kFaceText);
@@ -27,11 +28,21 @@ char* put_number(char* to, Number number) {
   return std::to_chars(to, to + 32, number).ptr;
 }
 
-char* put_vector(char* to, std::string_view keyword, Vec3f v) {
-  to = put(to, keyword);
+char* put_numbers(char* to, Vec3f v) {
   for (int axis = 0; axis < 3; ++axis) {
     *to++ = ' ';
     to = put_number(to, v[axis]);
+  }
+  return to;
+}
+
+/// `colour`: behind the position, from 0 to 1; null: none.
+char* put_vector(char* to, std::string_view keyword, Vec3f v,
+                 const VertexColour* colour = nullptr) {
+  to = put_numbers(put(to, keyword), v);
+  if (colour) {
+    const auto part = [&](std::size_t i) { return static_cast<float>((*colour)[i]) / 255; };
+    to = put_numbers(to, {part(0), part(1), part(2)});
   }
   *to++ = '\n';
   return to;
@@ -79,10 +90,11 @@ void append_text(FileWriter& out, tbb::task_arena& arena, std::size_t count,
 
 }  // namespace
 
-ObjSink::ObjSink(std::string path, bool force, int threads)
+ObjSink::ObjSink(std::string path, bool force, int threads, MeshLabelling labelling)
     : out_(std::move(path), force),
       faces_(open_scratch_beside(out_.path())),
-      arena_(threads > 0 ? threads : tbb::task_arena::automatic) {}
+      arena_(threads > 0 ? threads : tbb::task_arena::automatic),
+      labelling_(std::move(labelling)) {}
 
 std::uint64_t ObjSink::memory_with(int threads) {
   return static_cast<std::uint64_t>(threads > 0 ? threads : tbb::info::default_concurrency()) *
@@ -93,12 +105,15 @@ void ObjSink::begin(const MeshHeader& header) {
   has_normals_ = header.has_normals;
   out_.writer().append("# Isobrick\n");
   if (!header.unit.empty()) out_.writer().append("# unit " + header.unit + "\n");
+  if (!labelling_.name.empty()) out_.writer().append("o " + labelling_.line() + "\n");
+  has_colours_ = header.has_colours || labelling_.colour;
 }
 
-void ObjSink::write(const MeshChunk& chunk) {
+void ObjSink::write(const MeshChunk& given) {
+  const MeshChunk chunk = labelling_.coloured(given, colours_);
   const bool normals = !chunk.normals.empty();
   append_text(out_.writer(), arena_, chunk.positions.size(), [&](char* to, std::size_t i) {
-    to = put_vector(to, "v", chunk.positions[i]);
+    to = put_vector(to, "v", chunk.positions[i], has_colours_ ? &chunk.colours[i] : nullptr);
     return normals ? put_vector(to, "vn", chunk.normals[i]) : to;
   });
   const auto append_faces = [&](auto triangles) {

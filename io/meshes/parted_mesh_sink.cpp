@@ -34,7 +34,7 @@ void PartedMeshSink::begin(const MeshHeader& header) {
 }
 
 void PartedMeshSink::write(const MeshChunk& chunk) {
-  append_rows(rows_, chunk);
+  append_rows(rows_, chunk, colour_bytes_);
   size_.vertices += chunk.positions.size();
   const auto add = [&](auto triangles) {
     runs_.add(size_.triangles, triangles);
@@ -49,6 +49,12 @@ void PartedMeshSink::write(const MeshChunk& chunk) {
 
 std::uint64_t PartedMeshSink::bytes() const {
   return rows_.size() + triangles_.size() + part_bytes_ + out_.index().writer().size();
+}
+
+void PartedMeshSink::for_each_part(const std::function<void(const MeshPart&)>& take) {
+  const std::vector<MeshRun> runs = runs_.runs(size_);
+  for (std::size_t i = 0; i < runs.size(); ++i)
+    isobrick::for_each_part(stored_, i, runs[i], part_triangles_, take);
 }
 
 std::vector<std::uint32_t> PartedMeshSink::write_parts(
@@ -70,7 +76,7 @@ std::vector<std::uint32_t> PartedMeshSink::write_parts(
   std::atomic<std::uint64_t> written = 0;
   out_.parts_folder();
   const auto write_run = [&](std::size_t i) {
-    for_each_part(mesh, i, runs[i], part_triangles_, [&](const MeshPart& part) {
+    isobrick::for_each_part(mesh, i, runs[i], part_triangles_, [&](const MeshPart& part) {
       FileWriter out = out_.create_part(part_name(part.run, part.number, extension));
       write_part(out, mesh, part);
       out.finish();

@@ -42,6 +42,8 @@ class PartedMeshSink : public MeshSink {
   /// What was written so far, to be read while the sink lives and its scratch files do.
   const StoredMesh& stored() const { return stored_; }
 
+  /// Calls take(part) for the parts of the mesh, in order.
+  void for_each_part(const std::function<void(const MeshPart&)>& take);
   /// Creates a file for each part of the mesh and calls write_part(file, mesh, part), on `threads`
   /// threads at a time; in order with one. Returns the number of parts of each run.
   std::vector<std::uint32_t> write_parts(
@@ -49,6 +51,12 @@ class PartedMeshSink : public MeshSink {
       const std::function<void(FileWriter&, const StoredMesh&, const MeshPart&)>& write_part);
   /// Appends the whole mesh: rows as append_rows() writes them, then triangles of UInt32.
   void append_whole(FileWriter& out);
+
+  /// Has the rows keep colours of so many bytes, after begin() and before anything is written.
+  void keep_colours(std::size_t bytes) {
+    colour_bytes_ = bytes;
+    stored_.row_bytes += bytes;
+  }
 
   /// Frees what scratch files take of the memory. They are not needed any more.
   void release_scratch() {
@@ -64,6 +72,7 @@ class PartedMeshSink : public MeshSink {
   RunFinder runs_;
   MeshSize size_;
   bool has_normals_ = false;
+  std::size_t colour_bytes_ = 0;
   std::string unit_;
   std::vector<std::string> attributes_;
 };

@@ -23,8 +23,9 @@ inline void put_ply_face(std::byte* to, const Triangle& triangle) {
   std::memcpy(to + 1, triangle.data(), sizeof(Triangle));
 }
 
-/// Of the same length for every size, so that it can be replaced when the size is known.
-std::string ply_header(const MeshHeader& header, MeshSize size);
+/// Of the same length for every size, so that it can be replaced when the size is known. A `name`
+/// of one line becomes a comment.
+std::string ply_header(const MeshHeader& header, MeshSize size, const std::string& name = {});
 
 /// Throws Error where PLY cannot number so many vertices.
 void check_ply_vertices(std::uint64_t vertices, const std::string& path);

@@ -13,9 +13,9 @@ static_assert(sizeof(Vec3f) == 12);
 
 namespace {
 
-void append_attributed_rows(FileWriter& out, const MeshChunk& chunk) {
+void append_long_rows(FileWriter& out, const MeshChunk& chunk, std::size_t colour_bytes) {
   const bool normals = !chunk.normals.empty();
-  const std::size_t row = row_bytes(normals, chunk.attributes.size());
+  const std::size_t row = row_bytes(normals, chunk.attributes.size(), colour_bytes);
   const std::size_t batch = FileWriter::kBuffer / row;
   for (std::size_t first = 0; first < chunk.positions.size(); first += batch) {
     const std::size_t end = std::min(chunk.positions.size(), first + batch);
@@ -28,6 +28,9 @@ void append_attributed_rows(FileWriter& out, const MeshChunk& chunk) {
       put(chunk.positions[i]);
       if (normals) put(chunk.normals[i]);
       for (const VertexAttribute& attribute : chunk.attributes) put(attribute.values[i]);
+      if (colour_bytes == 0) continue;
+      std::memcpy(to, chunk.colours[i].data(), colour_bytes);
+      to += colour_bytes;
     }
     out.commit((end - first) * row);
   }
@@ -35,8 +38,9 @@ void append_attributed_rows(FileWriter& out, const MeshChunk& chunk) {
 
 }  // namespace
 
-void append_rows(FileWriter& out, const MeshChunk& chunk) {
-  if (!chunk.attributes.empty()) return append_attributed_rows(out, chunk);
+void append_rows(FileWriter& out, const MeshChunk& chunk, std::size_t colour_bytes) {
+  if (!chunk.attributes.empty() || colour_bytes > 0)
+    return append_long_rows(out, chunk, colour_bytes);
   if (chunk.normals.empty()) {
     out.append(std::as_bytes(chunk.positions));
     return;

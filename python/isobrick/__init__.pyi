@@ -1,5 +1,5 @@
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, Optional, Union, overload
 
@@ -48,6 +48,7 @@ class Mesh:
         normals: Optional[ArrayLike] = None,
         *,
         unit: str = "",
+        attributes: Optional[Mapping[str, ArrayLike]] = None,
     ) -> None: ...
     @property
     def vertices(self) -> NDArray[np.float32]: ...
@@ -57,6 +58,8 @@ class Mesh:
     def faces(self) -> NDArray[np.uint32]: ...
     @property
     def unit(self) -> str: ...
+    @property
+    def attributes(self) -> dict[str, NDArray[Any]]: ...
     def __len__(self) -> int: ...
     def save(
         self,
@@ -64,6 +67,7 @@ class Mesh:
         *,
         force: bool = False,
         quantize: bool = False,
+        compress: bool = False,
         levels: Optional[int] = None,
         sharded: bool = False,
         progress: _Progress = None,
@@ -250,6 +254,7 @@ class Extractor:
         progress: _Progress = None,
         force: bool = False,
         quantize: bool = False,
+        compress: bool = False,
     ) -> dict[str, Any]: ...
 
 def extract_labels(
@@ -415,6 +420,7 @@ class Volume:
         gpu_memory: _Bytes = 0,
         device: int = 0,
         progress: _Progress = None,
+        attributes: Optional[Mapping[str, Union[Volume, _Path]]] = None,
     ) -> Mesh: ...
     @overload
     def extract(
@@ -440,6 +446,7 @@ class Volume:
         gpu_memory: _Bytes = 0,
         device: int = 0,
         progress: _Progress = None,
+        attributes: Optional[Mapping[str, Union[Volume, _Path]]] = None,
     ) -> list[Mesh]: ...
     def extract_to_device(
         self,
@@ -516,6 +523,8 @@ class Volume:
         progress: _Progress = None,
         force: bool = False,
         quantize: bool = False,
+        compress: bool = False,
+        attributes: Optional[Mapping[str, Union[Volume, _Path]]] = None,
     ) -> dict[str, Any]: ...
     def extract_piece(
         self,
@@ -623,6 +632,7 @@ def merge(
     progress: _Progress = None,
     force: bool = False,
     quantize: bool = False,
+    compress: bool = False,
     levels: Optional[int] = None,
     sharded: bool = False,
 ) -> Mesh: ...
@@ -643,6 +653,7 @@ def merge(
     progress: _Progress = None,
     force: bool = False,
     quantize: bool = False,
+    compress: bool = False,
     levels: Optional[int] = None,
     sharded: bool = False,
 ) -> dict[str, Any]: ...

@@ -277,14 +277,22 @@ def filter_options(
     return options
 
 
+def attribute_name(name):
+    if not isinstance(name, str):
+        raise TypeError(f"the name of an attribute must be a text, not {name!r}")
+    return name
+
+
 def mesh_file_options(
-    *, force=False, quantize=False, threads=0, memory=2**30, levels=None, sharded=False,
+    *, force=False, quantize=False, compress=False, threads=0, memory=2**30, levels=None,
+    sharded=False,
 ):
     options = _isobrick.MeshFileOptions()
     options.levels = 0 if levels is None else integer(levels, "levels", 1, 2**31 - 1)
     options.sharded = bool(sharded)
     options.force = bool(force)
     options.quantize = bool(quantize)
+    options.compress = bool(compress)
     options.threads = thread_count(threads)
     options.memory = byte_count(memory)
     return options

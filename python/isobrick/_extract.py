@@ -184,6 +184,7 @@ class Extractor:
         topology="consistent", cap=False, min_component=0, largest=0, smooth=0, pass_band=0.1,
         simplify=None, max_error=None, measure=False,
         memory=2**30, threads=0, progress=None, force=False, quantize=False,
+        compress=False,
     ):
         """Streams a surface to a mesh file, so that the mesh may be larger than memory.
 
@@ -199,7 +200,9 @@ class Extractor:
             isovalue, roi=roi, normals=normals, inside=inside, drop_degenerate=drop_degenerate,
             topology=topology, cap=cap, memory=memory, threads=threads, progress=progress,
         )
-        file = mesh_file_options(force=force, quantize=quantize, threads=threads, memory=memory)
+        file = mesh_file_options(
+            force=force, quantize=quantize, compress=compress, threads=threads, memory=memory
+        )
         if self._on_device:
             raise UsageError("of an array in device memory, save extract(…).to_host()")
         with reporting(progress) as report:

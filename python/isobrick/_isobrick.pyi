@@ -72,6 +72,7 @@ class MeshFilterOptions:
 
 class MeshFileOptions:
     quantize: bool
+    compress: bool
     levels: int
     sharded: bool
     force: bool
@@ -114,6 +115,8 @@ class ConvertOptions:
 
 class MeshSink: ...
 
+def check_attribute_names(names: list[str]) -> None: ...
+
 class Mesh:
     unit: str
     def __init__(
@@ -134,7 +137,13 @@ class Mesh:
     def write_to(self, sink: MeshSink, report: Report) -> None: ...
     def filtered(self, options: MeshFilterOptions, report: Report) -> Mesh: ...
     def measure(self) -> dict[str, Any]: ...
-    def save(self, path: str, options: MeshFileOptions, report: Report) -> None: ...
+    def save(
+        self,
+        path: str,
+        attributes: list[tuple[str, NDArray[np.float32]]],
+        options: MeshFileOptions,
+        report: Report,
+    ) -> None: ...
 
 class DeviceMesh:
     @property
@@ -240,6 +249,7 @@ class Store:
         filters: MeshFilterOptions,
         path: str,
         file: MeshFileOptions,
+        attributes: list[tuple[str, Store]],
         report: Report,
     ) -> dict[str, Any]: ...
     def estimate(self, options: ExtractOptions) -> dict[str, Any]: ...

@@ -6,7 +6,10 @@ from typing import Optional
 import numpy as np
 
 from . import _isobrick
-from ._arguments import filter_options, mesh_file_options, path_text, unit_text
+from ._arguments import (
+    attribute_name, filter_options, mesh_file_options, path_text, unit_text,
+)
+from ._errors import UsageError
 from ._progress import reporting
 
 
@@ -40,7 +43,7 @@ class Measure:
 class Mesh:
     """A triangle mesh in memory, as NumPy arrays without copies.
 
-    `Mesh(vertices, faces, normals=None, unit="")` copies arrays of others.
+    `Mesh(vertices, faces, normals=None, unit="", attributes=None)` copies arrays of others.
 
     Attributes
     ----------
@@ -52,14 +55,17 @@ class Mesh:
         Numbers of vertices, counter-clockwise seen from outside.
     unit : str
         Of the vertices, such as "millimeter"; empty where it is not known.
+    attributes : dict of (N,) float32
+        Values at the vertices by their names, such as samples of other volumes. The dictionary can be
+        changed; NaN means unknown.
 
     The arrays lie in the memory of the mesh and keep it alive. They can be changed, and
     other libraries take them without copies (`__dlpack__`, `__array_interface__`).
     """
 
-    __slots__ = ("_native",)
+    __slots__ = ("_native", "_attributes")
 
-    def __init__(self, vertices, faces, normals=None, *, unit=""):
+    def __init__(self, vertices, faces, normals=None, *, unit="", attributes=None):
         faces = np.asarray(faces)
         if faces.size and (faces.dtype.kind not in "ui" or faces.min() < 0):
             raise TypeError("faces must be numbers of vertices, integers of at least 0")
@@ -71,15 +77,21 @@ class Mesh:
             None if normals is None else np.ascontiguousarray(normals, np.float32),
             unit_text(unit),
         )
+        self._attributes = {
+            name: np.array(values, np.float32) for name, values in (attributes or {}).items()
+        }
 
     @classmethod
     def _of(cls, native):
         mesh = cls.__new__(cls)
         mesh._native = native
+        mesh._attributes = {}
         return mesh
 
     def __reduce__(self):
-        return _rebuilt, (self.vertices, self.faces, self.normals, self.unit)
+        return _rebuilt, (
+            self.vertices, self.faces, self.normals, self.unit, self._attributes
+        )
 
     @property
     def vertices(self):
@@ -102,6 +114,11 @@ class Mesh:
         """The unit of the vertices, such as "millimeter", or ""."""
         return self._native.unit
 
+    @property
+    def attributes(self):
+        """Values (N,) float32 at the vertices, by their names. The dictionary can be changed."""
+        return self._attributes
+
     def __len__(self):
         """The number of triangles."""
         return len(self.faces)
@@ -110,12 +127,14 @@ class Mesh:
         parts = [f"{len(self.vertices):,} vertices", f"{len(self.faces):,} triangles"]
         if self.normals is not None and len(self.vertices):
             parts.append("normals")
+        parts.extend(self._attributes)
         if self.unit:
             parts.append(f"in {self.unit}s")
         return f"<isobrick.Mesh: {', '.join(parts)}>"
 
     def save(
-        self, path, *, force=False, quantize=False, levels=None, sharded=False, progress=None,
+        self, path, *, force=False, quantize=False, compress=False, levels=None, sharded=False,
+        progress=None,
     ):
         """Writes a mesh file.
 
@@ -123,11 +142,13 @@ class Mesh:
         ----------
         path : str or path
             The extension is the format: .ply, .stl, .obj, .glb, .vtp, .pvtp, or .neuroglancer and
-            .3dtiles, folders of levels of detail.
+            .3dtiles, folders of levels of detail. `attributes` need .ply, .glb, .vtp or .pvtp.
         force : bool
             Replaces a file that exists; otherwise that is a UsageError.
         quantize : bool
             GLB only: 16 bits a coordinate.
+        compress : bool
+            GLB only: compressed without loss (EXT_meshopt_compression).
         levels : int, optional
             neuroglancer and 3D Tiles only: levels of detail at most; by default until one part has
             the whole mesh.
@@ -140,16 +161,32 @@ class Mesh:
         system refuses it.
         """
         options = mesh_file_options(
-            force=force, quantize=quantize, levels=levels, sharded=sharded
+            force=force, quantize=quantize, compress=compress, levels=levels, sharded=sharded
         )
+        attributes = [
+            (attribute_name(name), self._values(name, values))
+            for name, values in self._attributes.items()
+        ]
         with reporting(progress) as report:
-            self._native.save(path_text(path), options, report)
+            self._native.save(path_text(path), attributes, options, report)
+
+    def _values(self, name, values):
+        """The values of an attribute as the files have them."""
+        values = np.ascontiguousarray(values, np.float32)
+        if values.shape != (len(self.vertices),):
+            raise UsageError(
+                f"the attribute {name!r} must have a number for each of the "
+                f"{len(self.vertices)} vertices, not the shape {values.shape}"
+            )
+        return values
 
     def filtered(
         self, *, min_component=0, largest=0, smooth=0, pass_band=0.1, simplify=None,
         max_error=None, unit="", threads=0, progress=None,
     ):
         """Another mesh, of components, smooth, simplified or in another unit, in this order.
+
+        It has no `attributes`, whose volumes can be sampled at its own vertices.
 
         Parameters
         ----------
@@ -215,6 +252,10 @@ class Mesh:
             normals = numpy_to_vtk(self.normals)
             normals.SetName("Normals")
             data.GetPointData().SetNormals(normals)
+        for name, values in self._attributes.items():
+            array = numpy_to_vtk(self._values(name, values))
+            array.SetName(name)
+            data.GetPointData().AddArray(array)
         if self.unit:
             unit = vtkStringArray()
             unit.SetName("unit")
@@ -233,6 +274,8 @@ class Mesh:
         import meshio
 
         data = {} if self.normals is None else {"normals": self.normals}
+        for name, values in self._attributes.items():
+            data[name] = self._values(name, values)
         return meshio.Mesh(self.vertices, [("triangle", self.faces)], point_data=data)
 
 
@@ -246,9 +289,9 @@ def with_measure(report):
     return {**report, "measure": Measure(**report["measure"])} if "measure" in report else report
 
 
-def _rebuilt(vertices, faces, normals, unit):
+def _rebuilt(vertices, faces, normals, unit, attributes=None):
     """A mesh from a pickle."""
-    return Mesh(vertices, faces, normals, unit=unit)
+    return Mesh(vertices, faces, normals, unit=unit, attributes=attributes)
 
 
 def _vtk_cells(faces, vertices):

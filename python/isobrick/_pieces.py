@@ -22,7 +22,7 @@ def part_numbers(part):
 def merge(
     pieces, path=None, *, min_component=0, largest=0, smooth=0, pass_band=0.1, simplify=None,
     max_error=None, measure=False, memory=2**30, threads=0, progress=None, force=False,
-    quantize=False, levels=None, sharded=False,
+    quantize=False, compress=False, levels=None, sharded=False,
 ):
     """Puts the pieces of a mesh together, which `Volume.extract_piece` or the program made.
 
@@ -37,7 +37,7 @@ def merge(
         None: the mesh comes as a `Mesh`.
     min_component, largest, smooth, pass_band, simplify, max_error
         As of `Volume.extract`.
-    measure, quantize, levels, sharded, force
+    measure, quantize, compress, levels, sharded, force
         Of a file, as of `Volume.save_mesh` and `Mesh.save`.
     memory, threads, progress
         As of `Volume.extract`.
@@ -57,8 +57,8 @@ def merge(
         with reporting(progress) as report:
             return Mesh._of(_isobrick.merge_mesh(names, filters, byte_count(memory), report))
     file = mesh_file_options(
-        force=force, quantize=quantize, threads=threads, memory=memory, levels=levels,
-        sharded=sharded,
+        force=force, quantize=quantize, compress=compress, threads=threads, memory=memory,
+        levels=levels, sharded=sharded,
     )
     with reporting(progress) as report:
         return with_measure(

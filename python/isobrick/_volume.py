@@ -7,7 +7,7 @@ import numpy as np
 
 from . import _isobrick
 from ._arguments import (
-    box_of, byte_count, extract_options, filter_options, histogram_bins, integer, is_list,
+    attribute_name, box_of, byte_count, extract_options, filter_options, histogram_bins, integer, is_list,
     label_options, mesh_file_options, number, one_isovalue, path_text, thread_count, unit_text,
 )
 from ._device import DeviceMesh, DeviceVolume, stream_number
@@ -16,6 +16,24 @@ from ._indexing import read_indexed
 from ._mesh import Mesh, meshes_of, with_measure
 from ._pieces import part_numbers
 from ._progress import reporting
+
+
+def _attribute_volumes(attributes):
+    """The volumes that a mesh takes its attributes from, by names."""
+    from ._open import open
+
+    volumes = {}
+    for name, other in (attributes or {}).items():
+        volumes[attribute_name(name)] = other if isinstance(other, Volume) else open(other)
+    _isobrick.check_attribute_names(list(volumes))
+    return volumes
+
+
+def _with_samples(mesh, volumes, threads):
+    """The mesh with the values of volumes at its vertices."""
+    for name, volume in volumes.items():
+        mesh.attributes[name] = volume.sample(mesh, threads=threads)
+    return mesh
 
 
 def _stream(stream):
@@ -179,7 +197,7 @@ class Volume:
         self, isovalue, *, level=0, roi=None, normals=False, inside=None, drop_degenerate=False,
         topology="consistent", cap=False, min_component=0, largest=0, smooth=0, pass_band=0.1,
         simplify=None, max_error=None, backend="auto",
-        memory=2**30, threads=0, gpu_memory=0, device=0, progress=None,
+        memory=2**30, threads=0, gpu_memory=0, device=0, progress=None, attributes=None,
     ):
         """The surface of an isovalue as a `Mesh`.
 
@@ -225,7 +243,11 @@ class Volume:
             0: all cores.
         progress : function or tqdm, optional
             A function of (stage, done, total) in bytes, a tqdm bar, or the class `tqdm`.
+        attributes : dict, optional
+            Volumes to sample at the vertices, by names: `Volume` or a path. `Mesh.attributes` has
+            the values, as of `sample()`.
         """
+        others = _attribute_volumes(attributes)
         request = dict(
             level=level, roi=roi, normals=normals, inside=inside,
             drop_degenerate=drop_degenerate, topology=topology, cap=cap, backend=backend,
@@ -237,10 +259,12 @@ class Volume:
             simplify=simplify, max_error=max_error, threads=threads,
         )
         if is_list(isovalue):
-            return self._extract_several(isovalue, request, filters)
+            meshes = self._extract_several(isovalue, request, filters)
+            return [_with_samples(mesh, others, threads) for mesh in meshes]
         options = self._surface(isovalue, **request)
         with reporting(progress) as report:
-            return Mesh._of(self._native.extract(options, filters, report))
+            mesh = Mesh._of(self._native.extract(options, filters, report))
+        return _with_samples(mesh, others, threads)
 
     def extract_to_device(
         self, isovalue, *, level=0, roi=None, normals=False, inside=None, device=0, gpu_memory=0,
@@ -344,7 +368,7 @@ class Volume:
         drop_degenerate=False, topology="consistent", cap=False, min_component=0, largest=0,
         smooth=0, pass_band=0.1, simplify=None, max_error=None, measure=False, backend="auto",
         memory=2**30, threads=0, gpu_memory=0, device=0, progress=None, force=False,
-        quantize=False,
+        quantize=False, compress=False, attributes=None,
     ):
         """Streams a surface to a mesh file, so that volume and mesh may be larger than memory.
 
@@ -362,10 +386,16 @@ class Volume:
             drop_degenerate=drop_degenerate, topology=topology, cap=cap, backend=backend,
             memory=memory, threads=threads, gpu_memory=gpu_memory, device=device,
         )
-        file = mesh_file_options(force=force, quantize=quantize, threads=threads, memory=memory)
+        file = mesh_file_options(
+            force=force, quantize=quantize, compress=compress, threads=threads, memory=memory
+        )
+        others = _attribute_volumes(attributes)
         with reporting(progress) as report:
             return with_measure(
-                self._native.save_mesh(options, filters, path_text(path), file, report)
+                self._native.save_mesh(
+                    options, filters, path_text(path), file,
+                    [(name, other._native) for name, other in others.items()], report,
+                )
             )
 
     def extract_piece(

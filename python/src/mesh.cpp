@@ -13,6 +13,7 @@
 
 #include <fmt/format.h>
 
+#include <isobrick/attributes.h>
 #include <isobrick/error.h>
 #include <isobrick/mesh_file_sink.h>
 #include <isobrick/mesh_filters.h>
@@ -134,6 +135,25 @@ void write_to(const Mesh& mesh, MeshSink& sink, const py::object& callback) {
   });
 }
 
+using FloatArray = py::array_t<float, py::array::c_style>;
+
+/// `attributes`: a value a vertex each.
+void save_mesh_file(const Mesh& mesh, const std::string& path,
+                    const std::vector<std::pair<std::string, FloatArray>>& attributes,
+                    const MeshFileOptions& options, const py::object& callback) {
+  std::vector<std::string> names;
+  std::vector<VertexAttribute> views;
+  for (const auto& [name, values] : attributes) {
+    names.push_back(name);
+    views.push_back({name, {values.data(), static_cast<std::size_t>(values.size())}});
+  }
+  check_attribute_names(names);
+  run_interruptibly(callback, [&](Reporter reporter) {
+    check_faces(mesh);
+    mesh.save(path, options, reporter.progress, views);
+  });
+}
+
 }  // namespace
 
 void bind_mesh(py::module_& module) {
@@ -169,13 +189,7 @@ void bind_mesh(py::module_& module) {
            [](const Mesh& mesh) {
              return describe(interruptible(py::none(), [&](Reporter) { return measure(mesh); }));
            })
-      .def("save", [](const Mesh& mesh, const std::string& path, const MeshFileOptions& options,
-                      const py::object& callback) {
-        run_interruptibly(callback, [&](Reporter reporter) {
-          check_faces(mesh);
-          mesh.save(path, options, reporter.progress);
-        });
-      });
+      .def("save", &save_mesh_file);
 }
 
 }  // namespace isobrick::python

@@ -94,6 +94,7 @@ void bind_mesh_file_options(py::module_& module) {
   py::class_<MeshFileOptions>(module, "MeshFileOptions")
       .def(py::init<>())
       .def_readwrite("quantize", &MeshFileOptions::quantize)
+      .def_readwrite("compress", &MeshFileOptions::compress)
       .def_readwrite("levels", &MeshFileOptions::levels)
       .def_readwrite("sharded", &MeshFileOptions::sharded)
       .def_readwrite("force", &MeshFileOptions::force)

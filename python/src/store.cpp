@@ -130,14 +130,28 @@ std::pair<Vec3d, Vec3d> bounds_of_surface(const OpenedVolume& volume, ExtractOpt
 
 py::dict save_mesh(const OpenedVolume& volume, ExtractOptions options,
                    const MeshFilterOptions& filters, const std::string& path,
-                   const MeshFileOptions& file, const py::object& callback) {
+                   const MeshFileOptions& file,
+                   const std::vector<std::pair<std::string, const OpenedVolume*>>& attributes,
+                   const py::object& callback) {
+  std::vector<SampledAttribute> sampled;
+  for (const auto& [name, other] : attributes) sampled.push_back({name, &other->store()});
   std::unique_ptr<MeshSink> sink;
+  std::unique_ptr<AttributeSink> sampler;
   std::unique_ptr<MeshFilter> filter;
   const ExtractReport report = interruptible(callback, [&](Reporter reporter) {
     options.cancel = reporter.cancel;
     sink = create_mesh_file(path, file);
-    filter = std::make_unique<MeshFilter>(
-        *sink, within_budget(filters, options.memory, 1, path, reporter));
+    if (!sampled.empty()) {
+      const SampleOptions usual;
+      sampler = std::make_unique<AttributeSink>(
+          *sink, sampled,
+          SampleOptions{.volume_unit = volume.store().info().levels.front().transform.unit,
+                        .threads = options.threads,
+                        .memory = std::min(usual.memory, options.memory / 8)});
+    }
+    filter =
+        std::make_unique<MeshFilter>(sampler ? static_cast<MeshSink&>(*sampler) : *sink,
+                                     within_budget(filters, options.memory, 1, path, reporter));
     return extract(volume.store(), options, *filter, reporter.progress);
   });
   py::dict result(py::arg("vertices") = report.vertices, py::arg("faces") = report.triangles,
@@ -243,6 +257,8 @@ void export_samples(const OpenedVolume& volume, const std::string& path, const s
 
 void bind_store(py::module_& module) {
   module.def("open", &open_volume);
+  module.def("check_attribute_names",
+             [](const std::vector<std::string>& names) { check_attribute_names(names); });
   module.def("default_cache_folder", [] { return default_cache_folder().string(); });
   py::class_<OpenedVolume>(module, "Store")
       .def_property_readonly("info",

@@ -5,6 +5,7 @@
 #include <cstring>
 #include <limits>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <isobrick/attributes.h>
@@ -254,6 +255,45 @@ TEST_F(Sample, ASinkAddsValuesToTheChunks) {
   EXPECT_NEAR(seen[0], linear(points[0]), 1e-3);
   EXPECT_NEAR(seen[1], linear(points[1]), 1e-3);
   EXPECT_TRUE(std::isnan(seen[2]));
+}
+
+TEST(AttributeColours, AreThoseOfTheScale) {
+  const VertexColour first{0x44, 0x01, 0x54, 255}, last{0xfd, 0xe7, 0x25, 255};
+  for (const auto& [low, high] : {std::pair(-2.0, 6.0), std::pair(6.0, -2.0)}) {
+    const AttributeColours colours{"p", low, high};
+    const bool rises = low < high;
+    const float inf = std::numeric_limits<float>::infinity();
+    for (const float value : {-2.F, -3.F, -1e30F, -inf})
+      EXPECT_EQ(colours.colour_of(value), rises ? first : last);
+    for (const float value : {6.F, 7.F, 1e30F, inf})
+      EXPECT_EQ(colours.colour_of(value), rises ? last : first);
+    EXPECT_EQ(colours.colour_of(2), (VertexColour{0x21, 0x91, 0x8c, 255}));
+    EXPECT_EQ(colours.colour_of(kNaN), (VertexColour{128, 128, 128, 255}));
+  }
+  const AttributeColours grey{"p", 0, 255, ColourMap::grey};
+  for (int i = 0; i < 256; ++i)
+    EXPECT_EQ(grey.colour_of(static_cast<float>(i))[1], static_cast<std::uint8_t>(i));
+  EXPECT_EQ((AttributeColours{"p", 0, 1, ColourMap::coolwarm}.colour_of(0.5F)),
+            (VertexColour{0xdd, 0xdd, 0xdd, 255}));
+}
+
+TEST(AttributeColours, ASinkAddsThem) {
+  std::vector<VertexColour> seen;
+  FunctionSink end([&](const MeshChunk& chunk) {
+    seen.assign(chunk.colours.begin(), chunk.colours.end());
+    EXPECT_EQ(chunk.attributes.size(), 2u);
+  });
+  ColourSink sink(end, {"q", 0, 1, ColourMap::grey});
+  EXPECT_THROW(sink.begin({.attributes = {"p"}}), UsageError);
+  EXPECT_THROW(sink.begin({}), UsageError);
+  sink.begin({.attributes = {"p", "q"}});
+  const std::vector<Vec3f> positions(2);
+  const std::vector<float> p{5, 5}, q{0, 1};
+  const VertexAttribute attributes[] = {{"p", p}, {"q", q}};
+  sink.write({.positions = positions, .attributes = attributes});
+  EXPECT_EQ(seen, (std::vector<VertexColour>{{0, 0, 0, 255}, {255, 255, 255, 255}}));
+  EXPECT_THROW(ColourSink(end, {"q", 1, 1}), UsageError);
+  EXPECT_THROW(ColourSink(end, {"q", 0, kNaN}), UsageError);
 }
 
 TEST(AttributeNames, MustBeIdentifiersOfTheirOwn) {

@@ -101,6 +101,20 @@ def test_ctrl_c_ends_a_save_and_leaves_no_file(tmp_path, extension):
     assert list(tmp_path.iterdir()) == []
 
 
+def test_a_compressed_glb_is_smaller(tmp_path):
+    mesh = isobrick.extract(ball(), 1, normals=True)
+    mesh.save(tmp_path / "plain.glb")
+    try:
+        mesh.save(tmp_path / "a.glb", compress=True)
+    except isobrick.UsageError as error:
+        pytest.skip(str(error))  # without meshoptimizer
+    mesh.save(tmp_path / "b.glb", compress=True, quantize=True)
+    sizes = [(tmp_path / name).stat().st_size for name in ("plain.glb", "a.glb", "b.glb")]
+    assert sizes[1] < 0.7 * sizes[0] and sizes[2] < 0.9 * sizes[1]
+    isobrick.Extractor(ball()).save(tmp_path / "c.glb", 1, normals=True, compress=True)
+    assert (tmp_path / "c.glb").read_bytes() == (tmp_path / "a.glb").read_bytes()
+
+
 def test_levels_of_detail(tmp_path):
     mesh = isobrick.extract(ball(), 1)
     try:

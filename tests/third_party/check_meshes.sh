@@ -18,6 +18,19 @@ for name in gyroid.ply gyroid.obj gyroid.vtp gyroid.pvtp gyroid.glb gyroid.quant
   "$isobrick" extract "$folder/gyroid.zarr" --isovalue 100.5 --normals gradient "$@" --quiet \
     -o "$folder/$name" || exit 1
 done
+# Its parts are compressed where the program can.
+for name in gyroid.compressed.glb gyroid.quantized.compressed.glb; do
+  case $name in *quantized*) set -- --quantize ;; *) set -- ;; esac
+  "$isobrick" extract "$folder/gyroid.zarr" --isovalue 100.5 --normals gradient "$@" --quiet \
+    --compress -o "$folder/$name" || [ $? -eq 2 ] || exit 1
+done
+# Colours of vertices.
+for name in gyroid.coloured.glb gyroid.coloured.compressed.glb; do
+  case $name in *compressed*) set -- --compress ;; *) set -- ;; esac
+  "$isobrick" extract "$folder/gyroid.zarr" --isovalue 100.5 --roi :60,:50,:40 "$@" --quiet \
+    --attribute "v=$folder/gyroid.zarr" --colour-by v=90:110 -o "$folder/$name" || [ $? -eq 2 ] ||
+    exit 1
+done
 # A sample equals the isovalue: triangles without area.
 for name in flat.ply flat.obj flat.vtp flat.pvtp flat.glb; do
   "$isobrick" extract "$folder/gyroid.zarr" --isovalue 100 --roi :60,:50,:40 --quiet \

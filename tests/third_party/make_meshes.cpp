@@ -29,6 +29,15 @@ void write_all(const std::filesystem::path& base, const TestMesh& mesh, bool nor
   write(PvtpSink(name(".pvtp"), true, part), mesh, normals, unit);
   write(GlbSink(name(".glb"), true), mesh, normals);
   write(GlbSink(name(".quantized.glb"), true, {.quantize = true}), mesh, normals);
+#ifdef ISOBRICK_WITH_MESHOPT
+  for (const bool quantize : {false, true})
+    write(GlbSink(name(quantize ? ".quantized.compressed.glb" : ".compressed.glb"), true,
+                  {.quantize = quantize, .compress = true, .part_triangles = 2500}),
+          mesh, normals);
+  write(GlbSink(name(".compressed.cut.glb"), true,
+                {.compress = true, .file_bytes = 10'000, .part_triangles = part}),
+        mesh, normals);
+#endif
   for (const bool quantize : {false, true})
     write(GlbSink(name(quantize ? ".quantized.cut.glb" : ".cut.glb"), true,
                   {.quantize = quantize, .file_bytes = cut, .part_triangles = part}),

@@ -1,5 +1,9 @@
+#include <array>
 #include <cmath>
+#include <cstdio>
 #include <cstring>
+
+#include <fmt/format.h>
 
 #include "tests/tools/program.h"
 
@@ -128,6 +132,97 @@ TEST_F(Attribute, IsReportedAndEstimated) {
   EXPECT_EQ(with["file_bytes"].get<int>(),
             plain["file_bytes"].get<int>() + 4 * plain["vertices"].get<int>());
   EXPECT_GT(with["memory_bytes"].get<std::int64_t>(), plain["memory_bytes"].get<std::int64_t>());
+}
+
+/// The colours of the vertices of a PLY, which end each row of `floats` floats and three bytes.
+std::vector<std::array<int, 3>> last_colours(const std::string& ply, std::size_t floats) {
+  const std::string end = "end_header\n", count = "element vertex ";
+  const std::size_t vertices = std::stoul(ply.substr(ply.find(count) + count.size()));
+  const char* row = ply.data() + ply.find(end) + end.size() + 4 * floats;
+  std::vector<std::array<int, 3>> colours;
+  for (std::size_t i = 0; i < vertices; ++i, row += 4 * floats + 3)
+    colours.push_back({static_cast<std::uint8_t>(row[0]), static_cast<std::uint8_t>(row[1]),
+                       static_cast<std::uint8_t>(row[2])});
+  return colours;
+}
+
+/// All values are the isovalue, so all colours are one of the scale.
+TEST_F(Attribute, ColoursAreThoseOfItsValues) {
+  const auto colour = [&](const Arguments& more) {
+    Arguments words{"--attribute", "p=" + store_, "--normals", "none"};
+    words.insert(words.end(), more.begin(), more.end());
+    const std::string ply = made("m.ply", words);
+    EXPECT_NE(ply.find("property float p\nproperty uchar red\nproperty uchar green\n"
+                       "property uchar blue\nelement face"),
+              ply.npos);
+    const auto colours = last_colours(ply, 4);
+    for (const auto& c : colours)
+      for (std::size_t i = 0; i < 3; ++i) EXPECT_NEAR(c[i], colours[0][i], 1);
+    return colours[0];
+  };
+  using Rgb = std::array<int, 3>;
+  EXPECT_EQ(colour({"--colour-by", "p=127.6:300"}), (Rgb{0x44, 0x01, 0x54}));
+  EXPECT_EQ(colour({"--colour-by", "p=-1:127.4"}), (Rgb{0xfd, 0xe7, 0x25}));
+  EXPECT_EQ(colour({"--colour-by", "p=127.4:-1"}), (Rgb{0x44, 0x01, 0x54}));
+  EXPECT_NEAR(colour({"--colour-by", "p=0:255", "--colour-map", "grey"})[0], 128, 1);
+  EXPECT_NEAR(colour({"--colour-by", "p=0:255"})[1], 0x91, 1);
+  EXPECT_EQ(colour({"--colour-by", "p=300:400", "--colour-map", "coolwarm"}),
+            (Rgb{0x3b, 0x4c, 0xc0}));
+}
+
+TEST_F(Attribute, ColoursReachOverTheVolumeByThemselves) {
+  const Outcome own = extract("own.ply", {"--attribute", "p=" + other_, "--colour-by", "p"});
+  ASSERT_EQ(own.exit_code, 0) << own.err;
+  const std::size_t at = own.err.find("colours of p reach from ");
+  ASSERT_NE(at, own.err.npos) << own.err;
+  int low = -1, high = -1;
+  ASSERT_EQ(std::sscanf(own.err.c_str() + at, "colours of p reach from %d to %d", &low, &high), 2);
+  EXPECT_GE(low, 0);
+  EXPECT_GT(high, low + 100);
+  const std::string range = fmt::format("p={}:{}", low, high);
+  const std::string named = made("named.ply", {"--attribute", "p=" + other_, "--colour-by", range});
+  EXPECT_EQ(read_file(path("own.ply")), named);
+}
+
+TEST_F(Attribute, ColoursAreInGlbAndOfParts) {
+  const Arguments coloured{"--attribute", "p=" + other_, "--colour-by", "p=0:255"};
+  for (const Arguments& form : {Arguments{"m.glb"}, {"q.glb", "--quantize"}}) {
+    Arguments words = coloured;
+    words.insert(words.end(), form.begin() + 1, form.end());
+    const std::string glb = made(form[0], words);
+    EXPECT_NE(glb.find("\"_P\":2,\"COLOR_0\":3"), glb.npos);
+    for (const char* part : {"1/2", "2/2"})
+      ASSERT_EQ(run({"extract", store_, "--isovalue", "127.5", "--part", part, "-o",
+                     path(std::string(part, 1) + ".piece"), "--force"})
+                    .exit_code,
+                0);
+    Arguments merge{"merge", path("1.piece"), path("2.piece"), "-o", path("merged.glb"), "--force"};
+    merge.insert(merge.end(), words.begin(), words.end());
+    const Outcome merged = run(merge);
+    ASSERT_EQ(merged.exit_code, 0) << merged.err;
+    EXPECT_EQ(read_file(path("merged.glb")), glb);
+  }
+  const auto bytes = [&](const Arguments& more) {
+    Arguments words{"extract", store_, "--isovalue", "127.5", "--estimate", "--format", "glb"};
+    words.insert(words.end(), more.begin(), more.end());
+    return run_json(words)["surfaces"][0]["file_bytes"].get<double>();
+  };
+  const double size = static_cast<double>(std::filesystem::file_size(path("m.glb")));
+  made("m.glb", coloured);
+  EXPECT_NEAR(bytes(coloured), static_cast<double>(std::filesystem::file_size(path("m.glb"))),
+              0.1 * size);
+}
+
+TEST_F(Attribute, RefusesColoursThatMakeNoSense) {
+  const std::string p = "p=" + other_;
+  refuse({"--colour-by", "p"}, {"--colour-by", "no attribute 'p'", "--attribute"});
+  refuse({"--attribute", p, "--colour-by", "q"}, {"no attribute 'q'"});
+  refuse({"--attribute", p, "--colour-by", "p=1"}, {"'p=1'", "NAME=LOW:HIGH"});
+  refuse({"--attribute", p, "--colour-by", "p=1:x"}, {"'x'"});
+  refuse({"--attribute", p, "--colour-by", "p=1:1"}, {"differ"});
+  refuse({"--attribute", p, "--colour-map", "grey"}, {"--colour-by"});
+  refuse({"--attribute", p, "--colour-by", "p", "--colour-map", "jet"}, {"'jet'", "viridis"});
+  refuse({"--attribute", p, "--colour-by", "p"}, {"--colour-by", "VTP"}, "never.vtp");
 }
 
 TEST_F(Attribute, RefusesWhatMakesNoSense) {

@@ -235,6 +235,8 @@ TEST_F(BadInput, FormatsOfMeshes) {
                  {"--format", "'step'"});
   expect_refused(run(extract + Arguments{"-o", path("a.ply"), "--quantize"}), 2,
                  {"--quantize", "GLB", "PLY"});
+  expect_refused(run(extract + Arguments{"-o", path("a.ply"), "--compress"}), 2,
+                 {"--compress", "GLB", "PLY"});
   expect_refused(run(extract + Arguments{"-o", path("a\nb.pvtp")}), 2, {"XML"});
   // A budget that leaves no room for cutting the mesh in parts.
   const Arguments tight{"--memory", "40M", "--threads", "1"};

@@ -66,6 +66,11 @@ TEST_F(Extract, WritesEveryFormatOfTheSameMesh) {
   extract("mesh.out", {"--format", "glb", "--quantize"});
   EXPECT_TRUE(read_file(path("mesh.out")).starts_with("glTF"));
   EXPECT_LT(read_file(path("mesh.out")).size(), read_file(path("a.glb")).size());
+  if (!kCanCompress) return;
+  extract("c.glb", {"--compress"});
+  EXPECT_LT(read_file(path("c.glb")).size(), read_file(path("a.glb")).size() * 6 / 10);
+  extract("both.glb", {"--compress", "--quantize"});
+  EXPECT_LT(read_file(path("both.glb")).size(), read_file(path("c.glb")).size() * 9 / 10);
 }
 
 TEST_F(Extract, EveryFormatIsAsLongAsPredicted) {

@@ -80,6 +80,9 @@ TEST_F(LabelOption, WritesEveryFormat) {
   EXPECT_TRUE(list("stl")["labels"][0]["vertices"].is_null());
   extract({"--labels", "7", "--format", "glb", "--quantize", "-o", path("small")});
   EXPECT_LT(fs::file_size(path("small/7.glb")), fs::file_size(path("glb/7.glb")));
+  if (!kCanCompress) return;
+  extract({"--labels", "7", "--format", "glb", "--compress", "-o", path("packed")});
+  EXPECT_LT(fs::file_size(path("packed/7.glb")), fs::file_size(path("small/7.glb")));
 }
 
 TEST_F(LabelOption, FiltersEachMesh) {
@@ -127,6 +130,17 @@ TEST_F(LabelOption, NamesAndColoursAreThoseOfTheImage) {
     EXPECT_EQ(labels[1]["name"], "left kidney");
     EXPECT_EQ(labels[1]["colour"], expected[1]["colour"]);
   }
+  const auto kidney = [&](const std::string& format) {
+    run_json({"extract", path("seg.zarr"), "--labels", "3", "--format", format, "-o",
+              path("in_" + format)});
+    return read_file(path("in_" + format) + "/3." + format);
+  };
+  const std::string ply = kidney("ply"), glb = kidney("glb");
+  EXPECT_NE(ply.find("comment name left kidney\n"), ply.npos);
+  EXPECT_NE(ply.find("property uchar red\n"), ply.npos);
+  EXPECT_NE(kidney("obj").find("\no left kidney\nv "), std::string::npos);
+  EXPECT_NE(glb.find(R"("nodes":[{"name":"left kidney","mesh":0)"), glb.npos);
+  EXPECT_NE(glb.find(R"("baseColorFactor":[0.2159,0.0,1.0,1])"), glb.npos);
   EXPECT_TRUE(run_json({"info", make_store("a")})["labels"].is_null());
   EXPECT_EQ(run_json({"info", store_})["labels"], nlohmann::json::array());
 }
@@ -323,6 +337,7 @@ TEST_F(LabelOption, RefusesWhatMakesNoSense) {
   expect_refused(refused({"--labels", "all", "--level", "9"}), 2, {"level 9"});
   expect_refused(refused({"--labels", "all", "--format", "pvtp"}), 2, {"PVTP"});
   expect_refused(refused({"--labels", "all", "--quantize"}), 2, {"--format glb"});
+  expect_refused(refused({"--labels", "all", "--compress"}), 2, {"--format glb"});
   expect_refused(refused({"--labels", "all", "--memory", "20M"}), 2, {"--memory"});
   expect_refused(run({"extract", store_, "--labels", "all", "-o", path("a.ply")}), 2,
                  {"a folder with a mesh for each label"});

@@ -36,6 +36,13 @@ struct Surroundings {
 
 using Arguments = std::vector<std::string>;
 
+/// Whether the program was built with what compresses GLB.
+#ifdef ISOBRICK_WITH_MESHOPT
+inline constexpr bool kCanCompress = true;
+#else
+inline constexpr bool kCanCompress = false;
+#endif
+
 /// Whether the system has a program of this name.
 bool available(const std::string& program);
 /// Whether it has pseudo terminals: a container may lack /dev/pts.

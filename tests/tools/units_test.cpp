@@ -119,14 +119,13 @@ TEST(Mesh, ItsMemoryIsKnownBeforeItIsOpened) {
   for (const MeshFormat format : {MeshFormat::ply, MeshFormat::stl, MeshFormat::obj,
                                   MeshFormat::glb, MeshFormat::vtp, MeshFormat::pvtp})
     for (const int threads : {0, 3})
-      for (const std::uint64_t memory : {64 * kMiB, 1024 * kMiB})
-        EXPECT_EQ(
-            mesh_file_memory(format, threads, memory),
-            create_mesh_file(
-                dir / "a", {.format = format, .force = true, .threads = threads, .memory = memory})
-                ->memory())
+      for (const std::uint64_t memory : {64 * kMiB, 1024 * kMiB}) {
+        const MeshFileOptions options{
+            .format = format, .force = true, .threads = threads, .memory = memory};
+        EXPECT_EQ(mesh_file_memory(format, options), create_mesh_file(dir / "a", options)->memory())
             << name_of(format);
-  EXPECT_EQ(mesh_file_memory(MeshFormat::ply, 0, 64 * kMiB), 0U);
+      }
+  EXPECT_EQ(mesh_file_memory(MeshFormat::ply, {.memory = 64 * kMiB}), 0U);
 }
 
 TEST(Mesh, ItsFormatSaysWhetherItNumbersMoreThan32Bits) {

@@ -1,6 +1,5 @@
 #include "io/meshes/levels/tile_content.h"
 
-#include <cmath>
 #include <cstring>
 #include <span>
 #include <vector>
@@ -9,17 +8,6 @@
 #include "io/meshes/gltf/glb_scene.h"
 
 namespace isobrick::inline v0 {
-namespace {
-
-/// The part of linear light, to four decimals, which are the same with every math library.
-double linear_light(std::uint8_t srgb) {
-  const double value = srgb / 255.0;
-  const double linear = value <= 0.04045 ? value / 12.92 : std::pow((value + 0.055) / 1.055, 2.4);
-  return std::round(linear * 1e4) / 1e4;
-}
-
-}  // namespace
-
 float tile_coordinate(const FragmentPlace& place, std::size_t axis, std::uint16_t step) {
   const std::int64_t at = std::int64_t{place.cell[axis]} * ChunkGrid::kSteps + step;
   return static_cast<float>(static_cast<double>(at) * place.grid.edge_of(place.level) /

@@ -62,6 +62,26 @@ std::span<const std::byte> GltfBuffers::get(const nlohmann::json& buffer, std::u
   return opened_[number] = open(buffer.at("uri").get_ref<const std::string&>());
 }
 
+std::span<const std::byte> GltfBuffers::decode(std::uint64_t number, const MeshoptView& view,
+                                               std::span<const std::byte> encoded) {
+  check_meshopt();
+  if (const auto known = decoded_.find(number); known != decoded_.end()) return known->second;
+  // No encoding is shorter, so a damaged number takes no memory.
+  constexpr std::size_t max_ratio = 64;
+  const auto fail = [&] { fail_gltf(path_, fmt::format("compressed view {} is damaged", number)); };
+  if (view.stride == 0 || view.stride > 256 || view.count / max_ratio > encoded.size() ||
+      view.count * view.stride / max_ratio > encoded.size())
+    fail();
+  const std::size_t size = view.count * view.stride;
+  const auto bytes = std::make_unique_for_overwrite<std::byte[]>(size);
+  if (!decode_meshopt(view, encoded, bytes.get())) fail();
+  ScratchBytes scratch;
+  scratch.append({bytes.get(), size});
+  const std::shared_ptr<MappedFile> file = scratch.map();
+  files_.push_back(file);
+  return decoded_[number] = file->bytes();
+}
+
 std::span<const std::byte> GltfBuffers::open(const std::string& uri) {
   std::shared_ptr<MappedFile> file;
   if (uri.starts_with("data:")) {

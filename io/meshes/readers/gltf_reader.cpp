@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstring>
@@ -94,7 +95,7 @@ class GltfReader {
       if (!root_.is_object()) fail("its scene is no object");
       if (root_.contains("extensionsRequired"))
         for (const json& name : root_.at("extensionsRequired"))
-          if (name != "KHR_mesh_quantization")
+          if (name != "KHR_mesh_quantization" && name != kMeshoptExtension)
             fail(fmt::format("it needs the extension {}, which is not read", name.dump()));
       const WorldMatrix root = choose_unit();
       if (root_.contains("scenes")) {
@@ -337,22 +338,39 @@ class GltfReader {
   Place place_of(const json& accessor, std::uint64_t size) {
     if (accessor.contains("sparse")) fail("it has sparse accessors, which are not read");
     const std::uint64_t count = index(accessor.at("count"));
-    const json& view = item("bufferViews", index(accessor.at("bufferView")));
-    const std::uint64_t buffer_number = index(view.at("buffer"));
-    const std::span<const std::byte> buffer =
-        buffers_.get(item("buffers", buffer_number), buffer_number);
-    const std::uint64_t offset = whole(view, "byteOffset", 0),
-                        inner = whole(accessor, "byteOffset", 0);
-    const std::uint64_t length = index(view.at("byteLength"));
+    const std::uint64_t view_number = index(accessor.at("bufferView"));
+    const json& view = item("bufferViews", view_number);
+    const std::span<const std::byte> bytes = view_bytes(view, view_number);
+    const std::uint64_t inner = whole(accessor, "byteOffset", 0), length = bytes.size();
     const std::uint64_t stride = whole(view, "byteStride", size);
-    if (offset > buffer.size() || length > buffer.size() - offset)
-      fail("a view goes beyond its buffer");
     if (stride < size || stride > 1024)
       fail(fmt::format("a view has a stride of {} bytes", stride));
     if (count > 0 &&
         (inner > length || size > length - inner || (length - inner - size) / stride < count - 1))
       fail(fmt::format("an accessor of {} items goes beyond its view of {} bytes", count, length));
-    return {buffer.data() + offset + inner, stride, count};
+    return {bytes.data() + inner, stride, count};
+  }
+
+  std::span<const std::byte> view_bytes(const json& view, std::uint64_t number) {
+    if (!view.contains("extensions") || !view.at("extensions").contains(kMeshoptExtension))
+      return bytes_of_buffer(view);
+    const json& packed = view.at("extensions").at(kMeshoptExtension);
+    const std::string mode = packed.at("mode"), filter = packed.value("filter", "NONE");
+    const MeshoptView form{mode, filter, index(packed.at("count")), index(packed.at("byteStride"))};
+    if (index(view.at("byteLength")) / std::max<std::uint64_t>(form.stride, 1) != form.count)
+      fail("a compressed view has another size than what it holds");
+    return buffers_.decode(number, form, bytes_of_buffer(packed));
+  }
+
+  /// The bytes that a view, or the extension of a compressed one, names.
+  std::span<const std::byte> bytes_of_buffer(const json& view) {
+    const std::uint64_t number = index(view.at("buffer"));
+    const std::span<const std::byte> buffer = buffers_.get(item("buffers", number), number);
+    const std::uint64_t offset = whole(view, "byteOffset", 0),
+                        length = index(view.at("byteLength"));
+    if (offset > buffer.size() || length > buffer.size() - offset)
+      fail("a view goes beyond its buffer");
+    return buffer.subspan(static_cast<std::size_t>(offset), static_cast<std::size_t>(length));
   }
 
   const std::string& path_;

@@ -2,9 +2,12 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <span>
 #include <string>
+#include <vector>
 
 #include <isobrick/error.h>
 #include <isobrick/mesh_file_sink.h>
@@ -48,6 +51,34 @@ class EndingProgress final : public Progress {
   int left_;
   std::uint64_t done_ = 0, total_ = 0;
 };
+
+TEST(MeshSave, WritesAttributes) {
+  const TempDir dir;
+  const TestMesh ball = make_ball({1, 2, 3}, 1, 800);  // several parts
+  const Mesh mesh = mesh_of(ball);
+  std::vector<float> values(ball.positions.size());
+  for (std::size_t i = 0; i < values.size(); ++i) values[i] = static_cast<float>(i);
+  const VertexAttribute number{"number", values};
+  for (const std::string extension : {"ply", "vtp", "pvtp", "glb"}) {
+    mesh.save(dir / ("a." + extension), {}, no_progress(), {&number, 1});
+    const auto sink = create_mesh_file(dir / ("b." + extension), {});
+    sink->begin({.has_normals = true, .attributes = {"number"}});
+    MeshChunk chunk = mesh.chunk();
+    chunk.attributes = {&number, 1};
+    sink->write(chunk);
+    sink->finish();
+    EXPECT_TRUE(bytes_of(dir / ("a." + extension)) == bytes_of(dir / ("b." + extension)) ||
+                extension == "pvtp")
+        << extension;
+  }
+  EXPECT_TRUE(bytes_of(dir / "a.pvtp.parts/part_1.vtp") ==
+              bytes_of(dir / "b.pvtp.parts/part_1.vtp"));
+  for (const std::string extension : {"stl", "obj"})
+    EXPECT_THROW(mesh.save(dir / ("a." + extension), {}, no_progress(), {&number, 1}), UsageError);
+  const VertexAttribute few{"few", std::span(values).first(7)};
+  EXPECT_THROW(mesh.save(dir / "c.ply", {}, no_progress(), {&few, 1}), UsageError);
+  EXPECT_FALSE(std::filesystem::exists(dir / "c.ply"));
+}
 
 TEST(MeshSave, WritesInPartsWhatOneChunkWrites) {
   const TempDir dir;
