@@ -40,8 +40,8 @@ struct Arguments {
   std::string raw, synth, type = "u8", write_raw;
   std::vector<Index> dims{512, 512, 512};
   double isovalue = 0;
-  bool has_isovalue = false, normals = false, drop_degenerate = false, brute_force = false,
-       check = false, cpu = false, json = false;
+  bool has_isovalue = false, normals = false, drop_degenerate = false, trilinear = false,
+       brute_force = false, check = false, cpu = false, json = false;
   double frequency = 0, noise = 0;
   int runs = 25, threads = 0;
 };
@@ -110,6 +110,7 @@ int run(const Arguments& a) {
   options.isovalue = a.has_isovalue ? a.isovalue : default_isovalue(v.type);
   options.normals = a.normals;
   options.drop_degenerate = a.drop_degenerate;
+  if (a.trilinear) options.topology = Topology::trilinear;
   options.roi = lattice.box();
 
   gpu::DeviceVolume resident(lattice, bricks, 0);
@@ -198,6 +199,7 @@ int main(int argc, char** argv) {
   app.add_option("--threads", a.threads, "that share a tile; 0: as many as are best");
   app.add_flag("--normals", a.normals);
   app.add_flag("--drop-degenerate", a.drop_degenerate);
+  app.add_flag("--trilinear", a.trilinear);
   app.add_flag("--brute-force", a.brute_force, "take every tile instead of searching");
   app.add_flag("--check", a.check, "compare with the CPU's mesh");
   app.add_flag("--cpu", a.cpu, "time the CPU as well");

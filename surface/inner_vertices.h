@@ -1,5 +1,9 @@
 #pragma once
 
+#include <type_traits>
+
+#include <isobrick/vec.h>
+#include "surface/cell_math.h"
 #include "surface/cell_topology.h"
 
 // Where the inner vertices of a cell's patch lie. Arithmetic that both backends can share verbatim.
@@ -84,6 +88,40 @@ ISOBRICK_HD inline CellPoint inner_vertex(const CellPatch& patch, const Necklace
   for (int axis = 0; axis < 3; ++axis)
     at.p[axis] = corner >> axis & 1 ? neck.high[axis] : neck.low[axis];
   return at;
+}
+
+/// The normal at a place in the cell: of the corners' gradients, interpolated. Where these vanish
+/// or are no numbers, of the interpolant's own gradient. `gradient_of(corner)` is in samples.
+template <class GradientOf>
+ISOBRICK_HD inline Vec3f normal_within(const WorldMap& world, const double (&d)[8],
+                                       const CellPoint& at, const GradientOf& gradient_of) {
+  Vec3f g{0, 0, 0};
+  for (int c = 0; c < 8; ++c) {
+    const Vec3f of_corner = gradient_of(c);
+    const auto weight = static_cast<float>(weight_of(c, at));
+    g.x += weight * of_corner.x;
+    g.y += weight * of_corner.y;
+    g.z += weight * of_corner.z;
+  }
+  const CellPoint own = gradient_at(d, at);
+  double size = 0;
+  for (const double v : own.p) size = std::fmax(size, std::fabs(v));
+  Vec3f fallback{0, 0, 1};
+  if (size > 0)
+    fallback = {static_cast<float>(own.p[0] / size), static_cast<float>(own.p[1] / size),
+                static_cast<float>(own.p[2] / size)};
+  return world.unit_normal(g, fallback);
+}
+
+/// The corners of a cell less the isovalue, in the order of its corners. `sample(corner)` has the
+/// sample's own type.
+template <class T, class Sample>
+ISOBRICK_HD inline void load_values(double (&d)[8], double isovalue, const Sample& sample) {
+  for (int c = 0; c < 8; ++c) {
+    const auto v = static_cast<double>(sample(c));
+    // The isovalue of an active cell of integers is finite.
+    d[c] = std::is_integral_v<T> ? v - isovalue : above_isovalue(v, isovalue);
+  }
 }
 
 }  // namespace isobrick::cell_topology

@@ -16,29 +16,6 @@ HWY_BEFORE_NAMESPACE();
 namespace isobrick::inline v0 {
 namespace HWY_NAMESPACE {
 
-/// The normal at a place in the cell: of the corners' gradients, interpolated. Where these vanish
-/// or are no numbers, of the interpolant's own gradient.
-template <class T>
-Vec3f normal_within(const ScalarVertices<T>& scalar, const double (&d)[8],
-                    const cell_topology::CellPoint& at, int x, int y, int z) {
-  Vec3f g{0, 0, 0};
-  for (int c = 0; c < 8; ++c) {
-    const Int3 offset{c & 1, c >> 1 & 1, c >> 2};
-    const T* p = scalar.samples + TileLayout::offset(x, y, z) + offset.x +
-                 offset.y * TileLayout::kRow + offset.z * TileLayout::kPlane;
-    const Vec3f of_corner = scalar.gradient(p, scalar.tile.shape.origin + Int3{x, y, z} + offset);
-    const auto weight = static_cast<float>(cell_topology::weight_of(c, at));
-    for (int axis = 0; axis < 3; ++axis) g[axis] += weight * of_corner[axis];
-  }
-  const cell_topology::CellPoint own = cell_topology::gradient_at(d, at);
-  double size = 0;
-  for (const double v : own.p) size = std::fmax(size, std::fabs(v));
-  Vec3f fallback{0, 0, 1};
-  if (size > 0)
-    for (int axis = 0; axis < 3; ++axis) fallback[axis] = static_cast<float>(own.p[axis] / size);
-  return scalar.context.world.unit_normal(g, fallback);
-}
-
 /// Writes the tile's inner vertices, in the order of their cells.
 template <class T>
 void write_inner_vertices(const KernelContext& context, const TileState& tile, Vec3f* positions,
@@ -62,7 +39,14 @@ void write_inner_vertices(const KernelContext& context, const TileState& tile, V
       for (int axis = 0; axis < 3; ++axis)
         where[axis] = static_cast<float>(origin[axis]) + static_cast<float>(at.p[axis]);
       *positions++ = context.world.position(where);
-      if (normals) *normals++ = normal_within(scalar, values.d, at, x, y, z);
+      if (!normals) continue;
+      *normals++ = cell_topology::normal_within(context.world, values.d, at, [&](int c) {
+        const Int3 corner{x + (c & 1), y + (c >> 1 & 1), z + (c >> 2)};
+        const T* p = scalar.samples + TileLayout::offset(static_cast<int>(corner.x),
+                                                         static_cast<int>(corner.y),
+                                                         static_cast<int>(corner.z));
+        return scalar.gradient(p, tile.shape.origin + corner);
+      });
     }
   }
 }

@@ -1,7 +1,6 @@
 #pragma once
 
-#include <type_traits>
-
+#include "surface/inner_vertices.h"
 #include "surface/tile_kernels.h"
 #include "surface/tile_state.h"
 #include "surface/topology_tables.h"
@@ -18,12 +17,9 @@ struct CellValues {
 
   CellValues(const T* samples, double isovalue, int x, int y, int z) {
     const T* first = samples + TileLayout::offset(x, y, z);
-    for (int c = 0; c < 8; ++c) {
-      const auto v = static_cast<double>(
-          first[(c & 1) + (c >> 1 & 1) * TileLayout::kRow + (c >> 2) * TileLayout::kPlane]);
-      // The isovalue of an active cell of integers is finite.
-      d[c] = std::is_integral_v<T> ? v - isovalue : cell_topology::above_isovalue(v, isovalue);
-    }
+    cell_topology::load_values<T>(d, isovalue, [&](int c) {
+      return first[(c & 1) + (c >> 1 & 1) * TileLayout::kRow + (c >> 2) * TileLayout::kPlane];
+    });
   }
 };
 

@@ -15,6 +15,7 @@
 #include "gpu/resident/resident_sizes.h"
 #include "gpu/search/search_kernel.h"
 #include "gpu/tile/supported.h"
+#include "surface/topology_tables.h"
 #include "surface/world_map.h"
 
 namespace isobrick::inline v0::gpu {
@@ -95,6 +96,14 @@ ResidentLauncher::ResidentLauncher(DeviceVolume::Impl& volume, const SurfaceOpti
     const int blocks = coincident_shapes_->shapes[0].blocks;
     work_ = DeviceBuffer<CoincidentWork>(
         std::min(volume.tile_count, static_cast<std::uint32_t>(blocks)), volume.stream);
+  }
+  if (options_.topology == Topology::trilinear) {
+    topology_ = DeviceBuffer<TopologyTables>(1, volume.stream);
+    check(cudaMemcpyAsync(topology_.data(), &topology_tables(), topology_.bytes(),
+                          cudaMemcpyHostToDevice, stream));
+    trilinear_work_ = DeviceBuffer<TrilinearWork>(
+        std::min(volume.tile_count, static_cast<std::uint32_t>(shapes_.shapes[0].blocks)),
+        volume.stream);
   }
   make_row_tables(std::min(volume.tile_count, kFirstRowTables));
 }
@@ -199,6 +208,7 @@ void ResidentLauncher::launch_tiles(double isovalue, const MeshRoom& room,
   p.triangle_capacity = room.triangles.size();
   p.end = launch_end();
   p.coincident = {work_.data(), sample_tables_.data(), nullptr, &counters()->left_out};
+  p.trilinear = {trilinear_work_.data(), topology_.data()};
   const LaunchShape shape = shape_for(isovalue, last);
   shape.launch(shape, p, cases_.data(), volume_.stream.get());
   ++launches_;  // only now: the sums of one that could not be launched are those of the next
@@ -258,8 +268,8 @@ bool ResidentLauncher::is_reported() const {
 
 std::uint64_t ResidentLauncher::bytes() const {
   return cases_.bytes() + items_.bytes() + slot_of_tile_.bytes() + order_.bytes() + words_.bytes() +
-         row_tables_.bytes() + sample_tables_.bytes() + work_.bytes() +
-         (volume_.array ? volume_.array->bytes() : 0);
+         row_tables_.bytes() + sample_tables_.bytes() + work_.bytes() + trilinear_work_.bytes() +
+         topology_.bytes() + (volume_.array ? volume_.array->bytes() : 0);
 }
 
 }  // namespace isobrick::gpu

@@ -87,6 +87,8 @@ class ResidentLauncher {
   DeviceBuffer<RowTable> row_tables_;
   DeviceBuffer<SampleTable> sample_tables_;
   DeviceBuffer<CoincidentWork> work_;
+  DeviceBuffer<TrilinearWork> trilinear_work_;
+  DeviceBuffer<TopologyTables> topology_;
   std::shared_ptr<PinnedBuffer<LaunchReport>> report_;
 };
 

@@ -20,7 +20,7 @@ constexpr std::uint64_t kSmallObjects = 64 << 10;
 }  // namespace
 
 ResidentSizes resident_sizes(const Lattice& lattice, const ResidentTiles& tiles, bool normals,
-                             bool drop_degenerate) {
+                             bool drop_degenerate, bool trilinear) {
   const auto grid = static_cast<std::uint64_t>(volume(lattice.tiles()));
   ResidentSizes sizes;
   sizes.volume_bytes =
@@ -35,6 +35,10 @@ ResidentSizes resident_sizes(const Lattice& lattice, const ResidentTiles& tiles,
                              std::min<std::uint64_t>(tiles.searched, kMaxCoincidentBlocks) *
                                  sizeof(CoincidentWork)
                        : 0) +
+      (trilinear
+           ? std::min<std::uint64_t>(tiles.searched, kMaxTrilinearBlocks) * sizeof(TrilinearWork) +
+                 sizeof(TopologyTables)
+           : 0) +
       tiles.searched * (sizeof(TileItem) + sizeof(OrderState)) +
       tiles.searched / kTilesOfSearchBlock * sizeof(unsigned long long) +
       mesh_bytes({tiles.active * kMeshOfTile.vertices, tiles.active * kMeshOfTile.triangles},

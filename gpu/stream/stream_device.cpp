@@ -10,6 +10,7 @@
 #include "gpu/stream/unpack_kernel.h"
 #include "gpu/tile/block_groups.h"
 #include "surface/cpu_extractor.h"
+#include "surface/topology_tables.h"
 #include "surface/world_map.h"
 
 namespace isobrick::inline v0::gpu {
@@ -73,6 +74,12 @@ bool StreamDevice::allocate(const StreamSizes& sizes) {
   if (options_.drop_degenerate) {
     params_.coincident.tables = arena.take<SampleTable>(sizes.slots);
     params_.coincident.work = arena.take<CoincidentWork>(sizes.coincident_blocks);
+  }
+  if (options_.topology == Topology::trilinear) {
+    auto* tables = arena.take<TopologyTables>(1);
+    check(cudaMemcpyAsync(tables, &topology_tables(), sizeof(TopologyTables),
+                          cudaMemcpyHostToDevice, kernel_.get()));
+    params_.trilinear = {arena.take<TrilinearWork>(sizes.trilinear_blocks), tables};
   }
   check(cudaMemsetAsync(number_ends_, 0, (kEnds + 1) * sizeof(unsigned long long), kernel_.get()));
   check(cudaMemsetAsync(params_.row_tables, 0, sizes.slots * sizeof(RowTable), kernel_.get()));

@@ -11,6 +11,7 @@
 #include "gpu/stream/stream_layout.h"
 #include "gpu/tile/block_groups.h"
 #include "gpu/tile/supported.h"
+#include "surface/cpu_extractor.h"
 #include "surface/surface_extractor.h"
 
 namespace isobrick::inline v0::gpu {
@@ -18,9 +19,12 @@ namespace {
 
 /// Mesh to expect of a tile before anything is known; launches shrink where there is more.
 constexpr std::uint64_t kVerticesOfTile = 1600, kTrianglesOfTile = 3200;
-/// What a tile can make at most: 3 edges a sample, 5 triangles a cell.
-constexpr std::uint64_t kMaxTileVertices = std::uint64_t{3} * 33 * 33 * 33,
-                        kMaxTileTriangles = std::uint64_t{5} * 32 * 32 * 32;
+/// What a tile can make at most: 3 edges a sample, and what the topology has in a cell.
+MeshSize max_tile_mesh(Topology topology) {
+  const MeshSize of_cell = CpuExtractor::max_in_cell(topology);
+  return {std::uint64_t{3} * 33 * 33 * 33 + of_cell.vertices * kTileBlockSamples,
+          of_cell.triangles * kTileBlockSamples};
+}
 /// Case table, ends of the numbering, and the rounding of buffers.
 constexpr std::uint64_t kSmallBuffers = 64 << 10;
 /// Bricks of fewer bytes are not sent: a copy has a price of its own.
@@ -83,8 +87,9 @@ StreamSizes stream_sizes(const Lattice& lattice, const SurfaceOptions& given, st
   const auto in_flight_count = static_cast<std::uint64_t>(in_flight);
   s.tiles = tiles;
   s.in_flight = in_flight;
-  s.vertices = std::max(kMaxTileVertices, tiles * kVerticesOfTile);
-  s.triangles = std::max(kMaxTileTriangles, tiles * kTrianglesOfTile);
+  const MeshSize most = max_tile_mesh(options.topology);
+  s.vertices = std::max(most.vertices, tiles * kVerticesOfTile);
+  s.triangles = std::max(most.triangles, tiles * kTrianglesOfTile);
   s.slots = static_cast<std::uint32_t>(
       slots_for(lattice, options.indexing == Indexing::welded, tiles, in_flight));
   s.tile_bricks = static_cast<std::uint32_t>(max_bricks_of_tile(lattice, sample_reach(options)));
@@ -92,13 +97,16 @@ StreamSizes stream_sizes(const Lattice& lattice, const SurfaceOptions& given, st
   const bool leaves_out = options.drop_degenerate;
   s.staging_bytes = StagingLayout(tiles, s.tile_bricks, leaves_out).end;
   if (leaves_out) s.coincident_blocks = std::min<std::uint32_t>(tiles, kMaxCoincidentBlocks);
+  const bool trilinear = options.topology == Topology::trilinear;
+  if (trilinear) s.trilinear_blocks = std::min<std::uint32_t>(tiles, kMaxTrilinearBlocks);
   s.output_bytes = MeshArrays::bytes(s.vertices, s.triangles, options.normals);
   const std::uint64_t groups = (tiles + kTilesOfBlockGroup - 1) / kTilesOfBlockGroup;
   s.tile_block_bytes = groups * kBlockGroupSamples * lattice.sample_bytes();
   s.device_bytes =
       kSmallBuffers + std::uint64_t{s.slots} * sizeof(RowTable) +
       (leaves_out ? std::uint64_t{s.slots} * sizeof(SampleTable) : 0) +
-      s.coincident_blocks * sizeof(CoincidentWork) + s.tile_block_bytes +
+      s.coincident_blocks * sizeof(CoincidentWork) + s.trilinear_blocks * sizeof(TrilinearWork) +
+      (trilinear ? sizeof(TopologyTables) : 0) + s.tile_block_bytes +
       pool_device_bytes(lattice, pool) +
       in_flight_count * (s.staging_bytes + s.sent_bricks * lattice.brick_bytes() + s.output_bytes);
   s.pinned_bytes = kSmallBuffers + in_flight_count * s.staging_bytes + kOutputs * s.output_bytes +

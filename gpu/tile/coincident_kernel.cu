@@ -8,8 +8,8 @@ namespace isobrick::inline v0::gpu {
 LaunchShape coincident_shape(ScalarType type, bool normals) {
   LaunchShape shape = visit_scalar(type, [&](auto tag) {
     using T = typename decltype(tag)::type;
-    return normals ? Launcher<384, T, true, true, true>::shape()
-                   : Launcher<384, T, false, true, true>::shape();
+    return normals ? Launcher<384, T, true, true, TileExtra::coincident>::shape()
+                   : Launcher<384, T, false, true, TileExtra::coincident>::shape();
   });
   shape.blocks = std::min(shape.blocks, kMaxCoincidentBlocks);
   return shape;

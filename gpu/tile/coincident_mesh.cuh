@@ -76,7 +76,7 @@ template <int N, class T, bool Normals>
 __device__ inline void write_sample_vertices(const TileShared& s, const TileParams& p, T value) {
   using Maker = VertexMaker<T>;
   const std::uint64_t first = s.vertex_base + s.all_vertices;
-  if (s.sample_vertices == 0 || first + s.sample_vertices > p.vertex_capacity) return;
+  if (s.extra_vertices == 0 || first + s.extra_vertices > p.vertex_capacity) return;
   const SampleTable& table = p.coincident.tables[s.tile.slot];
   const Maker maker{s, p, static_cast<typename Maker::R>(p.isovalue)};
   for (auto row = static_cast<int>(warp_id()); row < kRowsOfTile; row += BlockConfig<N>::kWarps) {

@@ -24,7 +24,7 @@ static_assert(kSharedBytes<BlockConfig<1024>::kMaxListed> <= 99 << 10, "what any
 /// The last block to come here reports to the host and zeroes the counters for the next launch.
 /// No fence orders this after the mesh: the host reads the mesh only once the launch is over, and
 /// the next launch zeroes the tiles' sums.
-template <int N, bool Coincident>
+template <int N, TileExtra Extra>
 __device__ void end_launch(TileShared& s, const TileParams& p) {
   const LaunchEnd& end = p.end;
   if (!end.report) return;
@@ -36,23 +36,25 @@ __device__ void end_launch(TileShared& s, const TileParams& p) {
     report(p, LaunchReport::kActiveTiles, *end.found);
     report(p, LaunchReport::kBlocks, end.blocks ? *end.blocks : 0);
     report(p, LaunchReport::kLeftOut,
-           Coincident ? DeviceWord(*p.coincident.left_out).load(cuda::memory_order_relaxed) : 0);
+           Extra == TileExtra::coincident
+               ? DeviceWord(*p.coincident.left_out).load(cuda::memory_order_relaxed)
+               : 0);
     if (s.items == 0) {
       report(p, LaunchReport::kVertices, 0);
       report(p, LaunchReport::kTriangles, 0);
     }
   }
-  if constexpr (Coincident) __syncthreads();  // what is zeroed has been read
+  if constexpr (Extra == TileExtra::coincident) __syncthreads();  // what is zeroed has been read
   for (std::uint32_t i = own_thread(); i < end.zero_words; i += N)
     DeviceFlag(end.zero[i]).store(0, cuda::memory_order_relaxed);  // others have added to them
 }
 
 /// Kernels that leave degenerate triangles out treat NaN, too: both need the samples around.
-template <int N, class T, bool Normals, bool Nan, bool Coincident = false>
+template <int N, class T, bool Normals, bool Nan, TileExtra Extra = TileExtra::none>
 __global__ void __launch_bounds__(N, BlockConfig<N>::kBlocks)
     extract_tiles(const __grid_constant__ TileParams p, const T threshold,
                   const CaseTable* __restrict__ cases) {
-  static_assert(Nan || !Coincident);
+  static_assert(Nan || Extra != TileExtra::coincident);
   extern __shared__ __align__(256) unsigned char shared_bytes[];
   TileShared& s = *reinterpret_cast<TileShared*>(shared_bytes);
   fill_tables<N>(s, cases);
@@ -67,10 +69,11 @@ __global__ void __launch_bounds__(N, BlockConfig<N>::kBlocks)
   __syncthreads();
   while (s.item < s.items) {
     classify_tile<N, T, Nan>(s, p, classifier);
-    if constexpr (Coincident) find_coincident<N>(s, p, threshold);
-    if (count_tile<N, Nan, Coincident>(s, p)) {
-      place_tile<N, Nan, Coincident>(s, p);
-      write_tile<N, T, Normals, Nan, Coincident>(s, p, threshold);
+    if constexpr (Extra == TileExtra::coincident) find_coincident<N>(s, p, threshold);
+    if constexpr (Extra == TileExtra::trilinear) find_patched<N, T, Nan>(s, p);
+    if (count_tile<N, Nan, Extra>(s, p)) {
+      place_tile<N, Nan, Extra>(s, p);
+      write_tile<N, T, Normals, Nan, Extra>(s, p, threshold);
     }
     if (s.items <= gridDim.x) {  // each block has one at most
       __syncthreads();
@@ -80,7 +83,7 @@ __global__ void __launch_bounds__(N, BlockConfig<N>::kBlocks)
     take_tile<T>(s, p, next_number(p));
     __syncthreads();
   }
-  end_launch<N, Coincident>(s, p);
+  end_launch<N, Extra>(s, p);
 }
 
 }  // namespace isobrick::gpu

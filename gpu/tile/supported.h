@@ -12,8 +12,9 @@ namespace isobrick::inline v0::gpu {
 
 /// Why the kernels cannot make such a surface, in a line; nothing when they can.
 inline std::optional<std::string> why_unsupported(const SurfaceOptions& options) {
-  if (options.topology == Topology::trilinear)
-    return "the topology of the trilinear interpolant has no kernels; use --backend cpu";
+  if (options.topology == Topology::trilinear && options.drop_degenerate)
+    return "the topology of the trilinear interpolant has no kernels without degenerate triangles; "
+           "use --backend cpu";
   if (options.cap) return "capped surfaces have no kernels; use --backend cpu";
   return std::nullopt;
 }

@@ -26,6 +26,9 @@ LaunchShapes launch_shapes(const TileKernel& kernel) {
   if (kernel.drop_degenerate)
     shapes.shapes[0] = shapes.shapes[1] = shapes.shapes[2] =
         coincident_shape(kernel.type, kernel.normals);
+  else if (kernel.trilinear)
+    shapes.shapes[0] = shapes.shapes[1] = shapes.shapes[2] =
+        trilinear_shape(kernel.type, kernel.normals, kernel.may_have_nan);
   else if (kernel.may_have_nan)
     shapes.shapes[0] = shapes.shapes[1] = shapes.shapes[2] = kernel.type == ScalarType::f64
                                                                  ? nan_shape<double>(kernel.normals)

@@ -15,10 +15,12 @@ struct TileKernel {
   bool normals = false;
   bool may_have_nan = false;  ///< of f32 and f64 only
   bool drop_degenerate = false;
+  bool trilinear = false;
 };
 inline TileKernel kernel_of(ScalarType type, const SurfaceOptions& given) {
   const SurfaceOptions options = options_that_matter(type, given);
-  return {type, options.normals, options.may_have_nan, options.drop_degenerate};
+  return {type, options.normals, options.may_have_nan, options.drop_degenerate,
+          options.topology == Topology::trilinear};
 }
 
 /// A kernel as it is launched: the number of its thread blocks that fill the device and their size.
@@ -44,6 +46,9 @@ struct LaunchShapes {
 
 /// Of a kernel that leaves degenerate triangles out.
 LaunchShape coincident_shape(ScalarType type, bool normals);
+
+/// Of a kernel that follows the trilinear interpolant.
+LaunchShape trilinear_shape(ScalarType type, bool normals, bool may_have_nan);
 
 /// Throws Error where no kernel fits the device.
 LaunchShapes launch_shapes(const TileKernel& kernel);

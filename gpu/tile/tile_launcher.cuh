@@ -15,9 +15,9 @@ inline int device_attribute(cudaDeviceAttr attribute) {
 }
 
 /// How many blocks of a kernel fill the current device, and how it is launched.
-template <int N, class T, bool Normals, bool Nan = false, bool Coincident = false>
+template <int N, class T, bool Normals, bool Nan = false, TileExtra Extra = TileExtra::none>
 struct Launcher {
-  static constexpr auto kKernel = extract_tiles<N, T, Normals, Nan, Coincident>;
+  static constexpr auto kKernel = extract_tiles<N, T, Normals, Nan, Extra>;
 
   static LaunchShape shape() {
     const bool before_ampere = device_attribute(cudaDevAttrComputeCapabilityMajor) < 8;

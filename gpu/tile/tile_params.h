@@ -4,6 +4,7 @@
 
 #include <isobrick/mesh.h>
 #include "gpu/tile/coincident_params.h"
+#include "gpu/tile/trilinear_params.h"
 #include "surface/cell_math.h"
 
 // What the host hands to the extraction kernel. Plain data, no CUDA header.
@@ -104,6 +105,13 @@ struct alignas(16) CaseTable {
 /// For right-handed axes, or mirrored ones.
 CaseTable make_case_table(bool mirrored);
 
+/// What a kernel does beside the tables of cases.
+enum class TileExtra : std::uint8_t {
+  none,
+  coincident,  ///< leaves degenerate triangles out
+  trilinear,   ///< follows the trilinear interpolant
+};
+
 struct TileParams {
   const TileItem* items;  ///< the active tiles in Morton order
   const std::uint32_t* item_count;
@@ -135,6 +143,7 @@ struct TileParams {
   std::uint64_t vertex_capacity, triangle_capacity;
   SurfaceTotals* totals;        ///< where there is no report
   CoincidentParams coincident;  ///< of the kernels that leave degenerate triangles out
+  TrilinearParams trilinear;    ///< of those that follow the trilinear interpolant
   LaunchEnd end;
 };
 

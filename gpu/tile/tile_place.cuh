@@ -77,7 +77,7 @@ __device__ inline void report(const TileParams& p, int word, std::uint64_t value
 
 /// Where the tile's vertices go. One warp.
 __device__ inline void place_vertices(TileShared& s, const TileParams& p) {
-  const std::uint32_t item = s.item, vertices = s.all_vertices + s.sample_vertices;
+  const std::uint32_t item = s.item, vertices = s.all_vertices + s.extra_vertices;
   const unsigned long long start = *p.number_start;
   const auto base = sum_before(
       [&](std::uint32_t i) -> unsigned long long& { return p.order[i].vertices; }, item, vertices);

@@ -100,7 +100,7 @@ struct alignas(256) TileShared {
   /// Of each plane's first 32 rows and of its last: vertices | cells << 16.
   std::uint32_t plane_sums[33], last_row_sums[33];
   std::uint32_t all_vertices, all_cells;  ///< on edges; that are listed
-  std::uint32_t sample_vertices;          ///< own coincident ones
+  std::uint32_t extra_vertices;           ///< own ones on samples or within cells
   unsigned long long vertex_base, triangle_base;
   std::uint32_t number_base;        ///< mesh number of the tile's first vertex
   std::uint32_t neighbour_base[8];  ///< bit set: one tile lower along that axis

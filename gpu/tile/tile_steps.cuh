@@ -6,6 +6,7 @@
 #include "gpu/tile/tile_count.cuh"
 #include "gpu/tile/tile_nan.cuh"
 #include "gpu/tile/tile_triangles.cuh"
+#include "gpu/tile/tile_trilinear.cuh"
 #include "gpu/tile/tile_vertices.cuh"
 
 // The steps from the samples of a tile to its mesh, and where its warps wait for each other.
@@ -54,17 +55,22 @@ __device__ inline void classify_tile(TileShared& s, const TileParams& p,
 
 /// Counts a tile's active edges and active cells, and numbers its vertices. False where there
 /// are none; the last tile, which reports the totals, goes on.
-template <int N, bool Nan, bool Coincident>
+template <int N, bool Nan, TileExtra Extra>
 __device__ inline bool count_tile(TileShared& s, const TileParams& p) {
   count_rows<N>(s, [&](int y, int z, RowEdges& edges) {
     if constexpr (Nan) leave_out_nan(nan_rows_of(s), y, z, edges);
-    if constexpr (Coincident) leave_out_coincident(coincident_work(p), y, z, edges);
+    if constexpr (Extra == TileExtra::coincident)
+      leave_out_coincident(coincident_work(p), y, z, edges);
+    if constexpr (Extra == TileExtra::trilinear)
+      edges.cells &= ~trilinear_work(p).cells[33 * z + y];
   });
   __syncthreads();
   if constexpr (Nan) clear_lists<N>(s, ListsOf<N>::kListed, ListsOf<N>::kListed);
   const PlaneBases bases = PlaneBases::of(s);
   const std::uint32_t vertices = bases.all_vertices(s);
-  if (!Nan && vertices + bases.cells == 0 && s.item + 1 < s.items) {
+  std::uint32_t beside = 0;  // triangles of cells that are in no list
+  if constexpr (Extra == TileExtra::trilinear) beside = trilinear_work(p).own_triangles;
+  if (!Nan && vertices + bases.cells + beside == 0 && s.item + 1 < s.items) {
     pass_empty_tile(s, p);
     __syncthreads();
     return false;
@@ -73,10 +79,11 @@ __device__ inline bool count_tile(TileShared& s, const TileParams& p) {
     s.next_cells = s.next_vertices = 0;
     s.all_vertices = vertices;
     s.all_cells = bases.cells;
-    s.sample_vertices = 0;
-    if constexpr (Coincident) s.sample_vertices = coincident_work(p).own;
+    s.extra_vertices = 0;
+    if constexpr (Extra == TileExtra::coincident) s.extra_vertices = coincident_work(p).own;
+    if constexpr (Extra == TileExtra::trilinear) s.extra_vertices = trilinear_work(p).own_vertices;
     if (listed_at_once<N, Nan>(s)) s.barriers.turn ^= 1;
-    publish_sum(p.order[s.item].vertices, s.item, s.all_vertices + s.sample_vertices);
+    publish_sum(p.order[s.item].vertices, s.item, s.all_vertices + s.extra_vertices);
   }
   if constexpr (Nan) __syncthreads();  // the lists are empty
   number_rows<N>(s, bases, p.row_tables[s.tile.slot]);
@@ -104,7 +111,7 @@ __device__ inline std::uint32_t list_cells_in_rounds(TileShared& s) {
 
 /// Lists the tile's cells and finds where its vertices and triangles go. Two warps wait for other
 /// tiles; the others wait for no more than the place of the vertices.
-template <int N, bool Nan, bool Coincident>
+template <int N, bool Nan, TileExtra Extra>
 __device__ inline void place_tile(TileShared& s, const TileParams& p) {
   const std::uint32_t cells = s.all_cells;
   const bool at_once = listed_at_once<N, Nan>(s);
@@ -131,7 +138,8 @@ __device__ inline void place_tile(TileShared& s, const TileParams& p) {
   if (at_once && (for_vertices || for_triangles)) wait(s.barriers.cells, turn);
   if (for_triangles) {
     if (at_once) triangles = triangles_before<N>(s, (cells + 31) / 32);
-    if constexpr (Coincident) triangles += coincident_work(p).kept;
+    if constexpr (Extra == TileExtra::coincident) triangles += coincident_work(p).kept;
+    if constexpr (Extra == TileExtra::trilinear) triangles += trilinear_work(p).own_triangles;
     if (lane_id() == 0) {
       s.all_triangles = triangles;
       publish_sum(p.order[s.item].triangles, s.item, triangles);
@@ -140,7 +148,7 @@ __device__ inline void place_tile(TileShared& s, const TileParams& p) {
   }
   if (for_vertices) {
     fetch_boundaries<N>(s, p, neighbour);
-    if constexpr (Coincident) fetch_owners(s, p);
+    if constexpr (Extra == TileExtra::coincident) fetch_owners(s, p);
     if (at_once) arrive(s.barriers.neighbours);
   } else if (at_once) {
     wait(s.barriers.vertex_base, turn);
@@ -151,7 +159,7 @@ template <int N, class T, bool Normals>
 __device__ inline void write_vertices(TileShared& s, const TileParams& p) {
   constexpr std::uint32_t kListed = ListsOf<N>::kListed;
   const std::uint32_t vertices = s.all_vertices;
-  if (s.vertex_base + vertices + s.sample_vertices > p.vertex_capacity) return;
+  if (s.vertex_base + vertices + s.extra_vertices > p.vertex_capacity) return;
   for (std::uint32_t first = 0; first < vertices; first += kListed) {
     if (first > 0) mark_vertices<N>(s, first);
     write_listed_vertices<N, T, Normals>(s, p, first, ::min(vertices - first, kListed));
@@ -190,7 +198,7 @@ __device__ inline bool can_help(TileShared& s) {
 }
 
 /// Writes the mesh of a tile that has its place.
-template <int N, class T, bool Normals, bool Nan, bool Coincident>
+template <int N, class T, bool Normals, bool Nan, TileExtra Extra>
 __device__ inline void write_tile(TileShared& s, const TileParams& p, T threshold) {
   const bool at_once = listed_at_once<N, Nan>(s);
   const bool has_waited = at_once && warp_id() == BlockConfig<N>::kVertices;
@@ -210,7 +218,8 @@ __device__ inline void write_tile(TileShared& s, const TileParams& p, T threshol
   number_edges<N>(s);
   __syncthreads();
   write_triangles<N>(s, p);
-  if constexpr (Coincident) write_coincident<N, T, Normals>(s, p, threshold);
+  if constexpr (Extra == TileExtra::coincident) write_coincident<N, T, Normals>(s, p, threshold);
+  if constexpr (Extra == TileExtra::trilinear) write_patched<N, T, Normals>(s, p);
 }
 
 }  // namespace isobrick::gpu

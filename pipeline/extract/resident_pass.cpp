@@ -40,7 +40,8 @@ class ResidentPass {
     if (!tiles) return false;
     report_search(stream, surfaces_.reports);
     const gpu::ResidentSizes sizes =
-        gpu::resident_sizes(lattice(), tiles->count(), any_normals(), any_drop_degenerate());
+        gpu::resident_sizes(lattice(), tiles->count(), any_normals(), any_drop_degenerate(),
+                            common().surface.topology == Topology::trilinear);
     const std::uint64_t beside = std::max(sizes.extractor_bytes, loader_.device_bytes());
     if (sizes.volume_bytes + beside + kPieceOfDriver > budget_) return false;
     try {

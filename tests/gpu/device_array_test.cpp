@@ -87,6 +87,18 @@ TYPED_TEST(GpuArray, DegenerateTrianglesAreLeftOut) {
     }
 }
 
+TYPED_TEST(GpuArray, BothTopologiesInTurn) {
+  const auto field = this->noise({67, 41, 75}, 1);
+  const ArrayOnDevice<TypeParam> on_device(field, kSampleLayouts[2]);
+  CachedExtractor extractor(on_device.array);
+  for (const Topology topology :
+       {Topology::consistent, Topology::trilinear, Topology::consistent}) {
+    SurfaceOptions options = surface(this->lowest() + 100, field.extent, true);
+    options.topology = topology;
+    expect_same(expected_mesh(field, options), extract(extractor, options).download());
+  }
+}
+
 TYPED_TEST(GpuArray, OfAnyExtentIsTheMeshOfTheCpu) {
   for (const Int3 extent : {Int3{1, 1, 1}, Int3{2, 2, 2}, Int3{32, 33, 64}, Int3{131, 70, 97}}) {
     const auto field = this->waves(extent);

@@ -78,6 +78,18 @@ TYPED_TEST(GpuResident, DegenerateTrianglesAreLeftOut) {
   compare(this->coarse({67, 41, 75}, 2), {mid}, options);
 }
 
+TYPED_TEST(GpuResident, TheTrilinearInterpolantIsFollowed) {
+  SurfaceOptions options;
+  options.topology = Topology::trilinear;
+  const double mid = this->lowest() + 100;
+  compare(this->noise({67, 41, 75}, 1), {mid, mid + 0.5, mid - 30}, options);
+  compare(this->coarse({67, 41, 75}, 1), {mid, mid + 1}, options);
+  compare(this->waves({131, 70, 97}), {mid - 40, mid}, options, 32);
+  options.roi = {{3, 0, 31}, {50, 33, 64}};
+  options.transform.spacing = {0.7, 1.3, -2};
+  compare(this->noise({67, 41, 75}, 2), {mid}, options);
+}
+
 /// A plane of edges at the volume's upper border, and no cell above it.
 TYPED_TEST(GpuResident, VolumesThatEndInsideATile) {
   const double mid = this->lowest() + 100;

@@ -294,6 +294,21 @@ TYPED_TEST(GpuStream, DegenerateTrianglesAreLeftOut) {
   compare(this->coarse(kOdd, 4), mid, options, {{5, 3, 64}});
 }
 
+TYPED_TEST(GpuStream, TheTrilinearInterpolantIsFollowed) {
+  SurfaceOptions options;
+  options.topology = Topology::trilinear;
+  const double mid = this->lowest() + 100;
+  compare(this->noise(kOdd, 1), mid, options, kManyWays);
+  compare(this->coarse(kOdd, 1), mid, options, {{5, 3, 64}});
+  compare(this->waves(kOdd), mid, options, {{5, 3, 64}});
+  options.indexing = Indexing::chunk_local;
+  compare(this->noise(kOdd, 3), mid, options, {{512, ~std::size_t{0}, 64}, {3, 4, 48}});
+  options.indexing = Indexing::welded;
+  options.roi = {{20, 3, 31}, {66, 40, 90}};
+  options.inside = Inside::below;
+  compare(this->noise(kOdd, 4), mid, options, {{5, 3, 64}});
+}
+
 template <class T>
 using GpuStreamWithNaN = DeviceTest<T>;
 
@@ -378,7 +393,10 @@ TEST(GpuExtractor, WhatHasNoKernelsIsRefused) {
         UsageError);
   };
   refused(ScalarType::u8, [](SurfaceOptions& o) { o.cap = true; });
-  refused(ScalarType::u8, [](SurfaceOptions& o) { o.topology = Topology::trilinear; });
+  refused(ScalarType::u8, [](SurfaceOptions& o) {
+    o.topology = Topology::trilinear;
+    o.drop_degenerate = true;
+  });
   refused(ScalarType::u8, [](SurfaceOptions& o) { o.isovalue = std::nan(""); });
   refused(ScalarType::u8, [](SurfaceOptions& o) { o.roi = {{99, 0, 0}, {100, 1, 1}}; });
 }

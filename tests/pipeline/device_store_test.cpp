@@ -106,6 +106,15 @@ TYPED_TEST(DeviceStoreOf, DegenerateTrianglesAreLeftOut) {
   testing::expect_same(on_cpu(*opened, options), extract_to_device(*opened, options).download());
 }
 
+TYPED_TEST(DeviceStoreOf, TheTrilinearInterpolantIsFollowed) {
+  const auto opened = this->template convert<TypeParam>({83, 70, 67}, BrickCodec::packed);
+  const ExtractOptions options{.isovalue = this->middle(*opened),
+                               .normals = true,
+                               .topology = Topology::trilinear,
+                               .threads = 2};
+  testing::expect_same(on_cpu(*opened, options), extract_to_device(*opened, options).download());
+}
+
 /// The pieces of a mesh are those of the CPU, and so is the mesh that they become.
 TYPED_TEST(DeviceStoreOf, PiecesAreThoseOfTheCpu) {
   const auto opened = this->template convert<TypeParam>({150, 140, 131}, BrickCodec::packed);
@@ -209,7 +218,8 @@ TEST_F(DeviceStore, WhatTheDeviceCannotDoIsRefused) {
   for (const ExtractOptions& options :
        {ExtractOptions{.isovalue = isovalue, .level = 9},
         ExtractOptions{.isovalue = std::numeric_limits<double>::quiet_NaN()},
-        ExtractOptions{.isovalue = isovalue, .topology = Topology::trilinear},
+        ExtractOptions{
+            .isovalue = isovalue, .drop_degenerate = true, .topology = Topology::trilinear},
         ExtractOptions{.isovalue = isovalue, .cap = true},
         ExtractOptions{.isovalue = isovalue, .backend = Backend::cpu},
         ExtractOptions{.isovalue = isovalue, .device = 99}})

@@ -101,10 +101,10 @@ TEST_F(Backend, OptionsThatMakeNoSense) {
 TEST_F(Backend, WhatHasNoKernelsIsRefusedAndAutoTakesTheCpu) {
   const std::string store = make_store("a");
   expect_refused(on_cuda(store, {"--cap"}), 2, {"--backend cuda: ", "capped", "--backend cpu"});
-  expect_refused(on_cuda(store, {"--topology", "trilinear"}), 2,
-                 {"--backend cuda: ", "trilinear", "--backend cpu"});
+  const Arguments trilinear{"--topology", "trilinear", "--drop-degenerate"};
+  expect_refused(on_cuda(store, trilinear), 2, {"--backend cuda: ", "trilinear", "--backend cpu"});
   EXPECT_FALSE(std::filesystem::exists(path("a.ply")));
-  for (const Arguments& option : {Arguments{"--cap"}, {"--topology", "trilinear"}}) {
+  for (const Arguments& option : {Arguments{"--cap"}, trilinear}) {
     Arguments all{"extract", store, "--isovalue", "127.5", "-o", path("auto.ply"), "--force"};
     all.insert(all.end(), option.begin(), option.end());
     EXPECT_EQ(run_json(all)["surfaces"][0]["backend"], "cpu");
@@ -183,6 +183,13 @@ TEST_F(Cuda, DegenerateTrianglesAreLeftOut) {
     EXPECT_EQ(cuda["degenerate_triangles"], cpu["degenerate_triangles"]);
     EXPECT_TRUE(read_file(path("cpu" + extension)) == read_file(path("cuda" + extension)));
   }
+}
+
+TEST_F(Cuda, TheTrilinearInterpolantIsFollowed) {
+  const std::string store = waves("f32", {"--brick", "32", "--noise", "0.5"});
+  for (const char* extension : {".ply", ".stl"})
+    compare(store, extension, {"--topology", "trilinear", "--normals", "gradient"});
+  compare(store, ".ply", {"--topology", "trilinear"}, {"--resume"});
 }
 
 TEST_F(Cuda, SurfacesByWayOfPiecesAreThoseOfTheCpu) {

@@ -12,6 +12,7 @@
 #include "gpu/resident/resident_sizes.h"
 #include "gpu/tile/tile_block.h"
 #include "surface/surface_extractor.h"
+#include "surface/topology_tables.h"
 #include "surface/world_map.h"
 #include "tests/gpu/compare.h"
 #include "tests/gpu/kernels/tile_runner.h"
@@ -226,6 +227,7 @@ struct KernelState {
         row_tables(tiles),
         sample_tables(tiles),
         work(kBlocks),
+        trilinear_work(kBlocks),
         zeroed(3 + (tiles + gpu::kTilesOfSearchBlock - 1) / gpu::kTilesOfSearchBlock) {}
 
   std::vector<gpu::TileItem> items;
@@ -235,6 +237,7 @@ struct KernelState {
   std::vector<gpu::SampleTable> sample_tables;
   static constexpr unsigned kBlocks = 3;  ///< at most, of an extraction
   std::vector<gpu::CoincidentWork> work;
+  std::vector<gpu::TrilinearWork> trilinear_work;
   std::uint32_t launches = 0, epoch = 0;
   unsigned long long number_start = 0, number_end = 0;
   std::uint32_t found = 0, item_count = 0;
@@ -268,6 +271,7 @@ struct KernelState {
     p.number_end = &number_end;
     p.ticket = zeroed_words() + 1;
     p.coincident = {work.data(), sample_tables.data(), nullptr, &zeroed[2]};
+    p.trilinear = {trilinear_work.data(), &topology_tables()};
     p.end = {&report,
              ++launches,
              &found,

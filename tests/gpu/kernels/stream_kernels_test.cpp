@@ -51,10 +51,12 @@ class Streamed {
     p.number_start = &start;
     p.number_end = &end;
     p.coincident = {work_.data(), sample_tables_.data(), neighbours_.data(), &totals.left_out};
+    p.trilinear = {trilinear_work_.data(), &topology_tables()};
     emulated::run_tiles({.type = lattice_.type,
                          .normals = options_.normals,
                          .may_have_nan = options_.may_have_nan,
                          .drop_degenerate = options_.drop_degenerate,
+                         .trilinear = options_.topology == Topology::trilinear,
                          .blocks = std::min(3u, count_),
                          .seed = ++epoch_},
                         p, cases_);
@@ -149,6 +151,7 @@ class Streamed {
   std::vector<gpu::RowTable> row_tables_;
   std::vector<gpu::SampleTable> sample_tables_;
   std::vector<gpu::CoincidentWork> work_;
+  std::vector<gpu::TrilinearWork> trilinear_work_ = std::vector<gpu::TrilinearWork>(3);
   gpu::CaseTable cases_;
   std::uint32_t tile_bricks_, count_ = 0, epoch_ = 0;
   std::uint64_t vertices_ = 0, triangles_ = 0, left_out_ = 0;
@@ -245,6 +248,18 @@ TYPED_TEST(StreamKernels, DegenerateTrianglesAreLeftOut) {
   compare_field(TestFields<TypeParam>::at_a_corner(6), 3);
 }
 
+TYPED_TEST(StreamKernels, TheTrilinearInterpolantIsFollowed) {
+  SurfaceOptions options;
+  options.isovalue = TestFixture::kMid;
+  options.topology = Topology::trilinear;
+  for (const auto& field : {TestFields<TypeParam>::noise({67, 41, 40}, 7),
+                            TestFields<TypeParam>::coarse({40, 41, 70}, 7)}) {
+    const Lattice lattice{field.extent, {16, 40, 23}, scalar_type_of<TypeParam>};
+    for (const std::size_t tiles : {1u, 100u})
+      compare(field, lattice, DenseBricks(lattice, field.samples.data()), options, tiles);
+  }
+}
+
 struct NoPlaces final : TilePlaces {
   void place(const TilePlace&) override {}
 };
@@ -254,9 +269,16 @@ TYPED_TEST(StreamKernels, APartOfTheTiles) {
   const auto field = TestFields<TypeParam>::coarse({161, 41, 41}, 7);
   const Lattice lattice{field.extent, {16, 40, 23}, scalar_type_of<TypeParam>};
   const DenseBricks bricks(lattice, field.samples.data());
-  for (const bool drop : {false, true})
+  struct Kind {
+    bool drop;
+    Topology topology;
+  };
+  for (const auto& [drop, topology] : {Kind{false, Topology::consistent},
+                                       {true, Topology::consistent},
+                                       {false, Topology::trilinear}})
     for (const std::uint64_t begin : {1u, 64u}) {  // tiles (1, 0, 0) and (4, 0, 0)
       SurfaceOptions options;
+      options.topology = topology;
       options.isovalue = TestFixture::kMid;
       options.roi = lattice.box();
       options.drop_degenerate = drop;

@@ -28,6 +28,7 @@ void compare(const KernelVolume<T>& volume, TileRun run, const std::vector<doubl
   run.normals = volume.options.normals;
   run.may_have_nan = volume.options.may_have_nan;
   run.drop_degenerate = volume.options.drop_degenerate;
+  run.trilinear = volume.options.topology == Topology::trilinear;
   KernelState state(volume.tiles(), volume.grid_tiles());
   std::size_t made = 0;
   for (const double isovalue : isovalues) {
@@ -214,6 +215,35 @@ TEST(TileKernelOf, DegenerateTrianglesBesideNaN) {
   options.drop_degenerate = options.may_have_nan = true;
   compare(with_nan(TestFields<float>::coarse({40, 50, 34}, 1), 2, 20), {}, {0}, options);
   compare(with_nan(TestFields<double>::coarse({33, 50, 34}, 1), 2, 5), {}, {1}, options);
+}
+
+TYPED_TEST(TileKernel, TheTrilinearInterpolantIsFollowed) {
+  constexpr double mid = TestFixture::kMid;
+  SurfaceOptions options;
+  options.topology = Topology::trilinear;
+  compare(TestFixture::Fields::noise({37, 41, 35}, 1), {.blocks = 3}, {mid, mid + 1}, options);
+  // Ties, and cells without a vertex of their tile's own.
+  compare(TestFixture::Fields::coarse({67, 34, 9}, 2, 2), {}, {mid}, options);
+  compare(TestFixture::Fields::waves({67, 41, 40}), {}, {mid}, options);
+}
+
+TYPED_TEST(TileKernel, TheTrilinearInterpolantOfARegion) {
+  SurfaceOptions options;
+  options.topology = Topology::trilinear;
+  options.roi = {{3, 0, 31}, {50, 33, 40}};
+  options.transform.spacing = {0.7, 1.3, -2};
+  for (const Inside inside : {Inside::above, Inside::below}) {
+    options.inside = inside;
+    compare(TestFixture::Fields::noise({55, 35, 44}, 5), {}, {TestFixture::kMid}, options);
+  }
+}
+
+TEST(TileKernelOf, TheTrilinearInterpolantBesideNaN) {
+  SurfaceOptions options;
+  options.topology = Topology::trilinear;
+  options.may_have_nan = true;
+  compare(with_nan(TestFields<float>::noise({40, 50, 34}, 1), 2, 20), {}, {0}, options);
+  compare(with_nan(TestFields<double>::noise({33, 50, 34}, 1), 2, 5), {}, {1}, options);
 }
 
 TEST(TileKernelOf, NotANumber) {

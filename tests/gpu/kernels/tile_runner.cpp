@@ -15,14 +15,14 @@
 namespace isobrick::emulated {
 namespace {
 
-template <int N, class T, bool Normals, bool Nan, bool Coincident = false>
+template <int N, class T, bool Normals, bool Nan, gpu::TileExtra Extra = gpu::TileExtra::none>
 struct Kernel {
   static constexpr std::uint32_t kListed = gpu::ListsOf<N>::kListed;
 
   static void run(const TileRun& r, const gpu::TileParams& params, const gpu::CaseTable& cases) {
     const T threshold = Threshold<T>(params.isovalue).value;
     launch(r.blocks, N, gpu::kSharedBytes<kListed, Nan>, r.seed,
-           [&] { gpu::extract_tiles<N, T, Normals, Nan, Coincident>(params, threshold, &cases); });
+           [&] { gpu::extract_tiles<N, T, Normals, Nan, Extra>(params, threshold, &cases); });
   }
 };
 
@@ -50,8 +50,19 @@ auto with_kernel(const TileRun& r, F&& f) {
   if (r.drop_degenerate)
     return visit_scalar(r.type, [&](auto tag) {
       using T = typename decltype(tag)::type;
-      return r.normals ? f(Kernel<384, T, true, true, true>())
-                       : f(Kernel<384, T, false, true, true>());
+      return r.normals ? f(Kernel<384, T, true, true, gpu::TileExtra::coincident>())
+                       : f(Kernel<384, T, false, true, gpu::TileExtra::coincident>());
+    });
+  if (r.trilinear)
+    return visit_scalar(r.type, [&](auto tag) {
+      using T = typename decltype(tag)::type;
+      using gpu::TileExtra;
+      if constexpr (std::is_floating_point_v<T>)
+        if (r.may_have_nan)
+          return r.normals ? f(Kernel<384, T, true, true, TileExtra::trilinear>())
+                           : f(Kernel<384, T, false, true, TileExtra::trilinear>());
+      return r.normals ? f(Kernel<384, T, true, false, TileExtra::trilinear>())
+                       : f(Kernel<384, T, false, false, TileExtra::trilinear>());
     });
   if (r.may_have_nan)
     return r.type == ScalarType::f64 ? with_nan_kernel<double>(r, f) : with_nan_kernel<float>(r, f);
