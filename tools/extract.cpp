@@ -389,7 +389,7 @@ void add_extract(Program& program) {
   add_parsed(app, arguments->topology, parse_topology,
              {"--topology", "consistent|trilinear",
               "How the surface passes where corners allow several ways: by a rule for faces, or as "
-              "the trilinear interpolant does, tunnels included (on the CPU)",
+              "the trilinear interpolant does, tunnels included",
               "consistent"});
   add_flag(app, "--cap", arguments->cap,
            "Close the surface at the border of the volume or region and around missing samples (on "

@@ -67,9 +67,9 @@ class ISOBRICK_API DeviceExtractor {
   DeviceExtractor(DeviceExtractor&&) noexcept;
 
   /// Waits until the size of the mesh is known, not until it is written. Throws UsageError for
-  /// another level or region than was read, for `cap`, Topology::trilinear, an isovalue that is not
-  /// a number, a region without samples and for `gpu_memory` that is too small;
-  /// gpu::OutOfDeviceMemory.
+  /// another level or region than was read, for `cap`, Topology::trilinear with `drop_degenerate`,
+  /// an isovalue that is not a number, a region without samples and for `gpu_memory` that is too
+  /// small; gpu::OutOfDeviceMemory.
   DeviceMesh extract(const ExtractOptions& options);
   /// Waits for nothing. The memory for the mesh is what the last one needed, some for the first.
   PendingDeviceMesh extract_async(const ExtractOptions& options);

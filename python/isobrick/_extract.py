@@ -143,10 +143,10 @@ class Extractor:
         inside : "above" or "below"
             Which samples are inside: those of at least the isovalue, or those less than it.
         drop_degenerate : bool
-            Leaves triangles without area out; not on a device.
+            Leaves triangles without area out.
         topology : "consistent" or "trilinear"
             How the surface passes where the corners of a cell allow several ways: by a rule for
-            faces, or as the trilinear interpolant does; not on a device.
+            faces, or as the trilinear interpolant does; on a device not with ``drop_degenerate``.
         cap : bool
             Closes the surface at the border and around missing samples; neither on a device nor
             with `drop_degenerate`.

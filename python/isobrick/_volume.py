@@ -218,7 +218,7 @@ class Volume:
             Leaves triangles without area out.
         topology : "consistent" or "trilinear"
             How the surface passes where the corners of a cell allow several ways: by a rule for
-            faces, or as the trilinear interpolant does; on the CPU.
+            faces, or as the trilinear interpolant does; with ``drop_degenerate`` on the CPU.
         cap : bool
             Closes the surface at the border and around missing samples; on the CPU, and not with
             `drop_degenerate`.
