@@ -39,7 +39,7 @@ class VtpSink final : public MeshSink {
 
 /// Writes a welded mesh as VTK partitioned PolyData (.pvtp): an index and, in
 /// the folder `path`.parts, one .vtp for each run of `part_triangles`. Vertices
-/// that several parts name are repeated in each; global ids tell that they are the same.
+/// that several parts name are repeated in each; global ids identify them.
 class PvtpSink final : public PartedMeshSink {
  public:
   /// See PartedOutput for what `path` and `force` may throw, and check_pvtp_name().

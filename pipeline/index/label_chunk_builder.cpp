@@ -122,7 +122,7 @@ class LabelChunkBuilder::Chunk {
   LabelList& list_of(Int3 b) {
     return lists_[static_cast<std::size_t>(linear_index(b - box_.lo, box_.extent()))];
   }
-  /// Whether ranges tell the labels of a brick; then its list is made.
+  /// Whether a brick's labels follow from its range; then its list is made.
   bool has_one_value(Int3 b);
   /// Reads bricks of a piece and makes their lists and parts.
   void add(std::span<const Int3> bricks);

@@ -55,7 +55,7 @@ SurfacePieces collect(std::span<const fs::path> paths) {
 /// Puts the pieces together, one after the other.
 class Merger {
  public:
-  /// `header` is what the sink was told.
+  /// `header` is what the sink began with.
   Merger(const SurfacePieces& pieces, MeshSink& sink, const MeshHeader& header,
          std::uint64_t chunk_bytes)
       : set_(pieces.set),

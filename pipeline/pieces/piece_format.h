@@ -15,7 +15,7 @@
 
 namespace isobrick::inline v0 {
 
-/// What pieces of surfaces and of labels are told apart by.
+/// What distinguishes pieces of surfaces from those of labels.
 struct PieceKey {
   Part part;
   TileRange tiles;      ///< whose mesh it holds

@@ -222,7 +222,7 @@ TYPED_TEST(TileKernel, TheTrilinearInterpolantIsFollowed) {
   SurfaceOptions options;
   options.topology = Topology::trilinear;
   compare(TestFixture::Fields::noise({37, 41, 35}, 1), {.blocks = 3}, {mid, mid + 1}, options);
-  // Ties, and cells without a vertex of their tile's own.
+  // Samples that equal the isovalue, and cells without a vertex of their tile's own.
   compare(TestFixture::Fields::coarse({67, 34, 9}, 2, 2), {}, {mid}, options);
   compare(TestFixture::Fields::waves({67, 41, 40}), {}, {mid}, options);
 }
