@@ -111,7 +111,8 @@ class EdgeCollapse {
   std::vector<std::uint32_t> gone_;
 };
 
-/// Which vertex each one of a group becomes by collapses; one that is in no collapse becomes itself.
+/// Which vertex each one of a group becomes by collapses; one that is in no collapse becomes
+/// itself.
 std::vector<std::uint32_t> final_vertices(const TriangleGroup& group,
                                           std::span<const Collapse> collapses);
 

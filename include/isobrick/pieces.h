@@ -59,8 +59,8 @@ struct MergeOptions {
 /// Puts the pieces together to the mesh that extract() of their options makes, and streams it into
 /// a sink of welded meshes (begin … finish). Throws as read_pieces() does, and DamageError for a
 /// piece that turns out damaged. Throws UsageError for a budget that is too small and a sink of
-/// another indexing. Throws Error for more vertices than 32 bits number where the sink does not take
-/// them (MeshSink::takes_wide). The sink is not finished then.
+/// another indexing. Throws Error for more vertices than 32 bits number where the sink does not
+/// take them (MeshSink::takes_wide). The sink is not finished then.
 ISOBRICK_API PiecesInfo merge_pieces(std::span<const std::filesystem::path> pieces, MeshSink& sink,
                                      const MergeOptions& options = {},
                                      Progress& progress = no_progress());
