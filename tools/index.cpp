@@ -98,32 +98,36 @@ IndexReport index_by_ranks(const std::string& store, IndexOptions options, Ranks
   return report;
 }
 
-/// Lists of labels, by this process alone.
-IndexReport index_labels(const IndexArguments& arguments, Console& console) {
+/// Lists of labels, which one process makes: of a job the first rank.
+IndexReport index_labels(const IndexArguments& arguments, Ranks* job, Console& console) {
   const IndexOptions& options = arguments.index;
   if (options.part || options.join > 0)
     throw UsageError("--kind labels has no parts: leave out --part and --join");
   if (options.leaf != kDefaultLeaf)
     throw UsageError("--kind labels has lists of 32 cells along each edge: leave out --leaf");
-  return add_label_index(arguments.store,
-                         {.selection = options.selection,
-                          .memory = options.memory,
-                          .threads = options.threads,
-                          .resume = options.resume,
-                          .force = options.force},
-                         console.progress());
+  IndexReport report;
+  if (job == nullptr || job->rank() == 0)
+    report = add_label_index(arguments.store,
+                             {.selection = options.selection,
+                              .memory = options.memory,
+                              .threads = options.threads,
+                              .resume = options.resume,
+                              .force = options.force},
+                             console.progress());
+  if (job != nullptr) job->wait_for_all();
+  return report;
 }
 
 int run_index(const IndexArguments& arguments, Console& console) {
   check_store(arguments.store);
   const IndexOptions& options = arguments.index;
   const bool is_whole = !options.part && options.join == 0;
-  Ranks* const job = is_whole && !arguments.has_labels ? join_job(arguments.mpi, console) : nullptr;
+  Ranks* const job = is_whole ? join_job(arguments.mpi, console) : nullptr;
   if (is_whole && job == nullptr)
     set_interrupt_note([] { return "the same command with --resume goes on with what is done"; });
   else
     set_interrupt_note([] { return "the same command goes on with what is done"; });
-  const IndexReport report = arguments.has_labels ? index_labels(arguments, console)
+  const IndexReport report = arguments.has_labels ? index_labels(arguments, job, console)
                              : job != nullptr
                                  ? index_by_ranks(arguments.store, options, *job, console)
                                  : add_index(arguments.store, options, console.progress());

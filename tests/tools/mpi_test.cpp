@@ -239,6 +239,16 @@ TEST_F(MpiIndex, IsThatOfOneProcess) {
   EXPECT_EQ(alone.exit_code, 0) << alone.err;
 }
 
+/// One rank makes lists of labels, and the others wait for it.
+TEST_F(Mpi, ListsOfLabelsAreThoseOfOneProcess) {
+  for (const char* name : {"one.zarr", "ranks.zarr"})
+    run_json({"synth", "cells", path(name), "--dims", "80,70,60", "--type", "u16"});
+  run_json({"index", path("one.zarr"), "--kind", "labels"});
+  const auto made = mpirun_json(3, {"index", path("ranks.zarr"), "--kind", "labels"});
+  EXPECT_EQ(made["kind"], "labels");
+  EXPECT_EQ(run_process({"diff", "-r", path("one.zarr"), path("ranks.zarr")}).out, "");
+}
+
 /// A rank is killed at one of its renames and removals: the job ends, the store has no index and no
 /// ranges or all of them, and the same command goes on.
 TEST_F(MpiIndex, AKilledRankEndsTheJob) {
