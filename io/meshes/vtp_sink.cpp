@@ -100,8 +100,9 @@ int PvtpSink::threads_within(int threads, std::uint64_t memory) {
   constexpr int most = 8;  // beyond, the disk bounds
   const auto affordable =
       static_cast<int>(std::min<std::uint64_t>(most, memory / 8 / memory_with(2)));
-  const int wanted = threads > 0 ? threads : tbb::info::default_concurrency();
-  return std::max(1, std::min(wanted, affordable));
+  // More than there are cores gain nothing, and oneTBB would complain.
+  const int cores = tbb::info::default_concurrency();
+  return std::max(1, std::min({threads > 0 ? threads : cores, cores, affordable}));
 }
 
 std::uint64_t PvtpSink::memory_with(int threads, std::uint64_t part_triangles) {
