@@ -1,6 +1,5 @@
 #include "io/meshes/obj_sink.h"
 
-#include <tbb/info.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
@@ -9,6 +8,8 @@
 #include <span>
 #include <utility>
 #include <vector>
+
+#include "core/thread_count.h"
 
 namespace isobrick::inline v0 {
 namespace {
@@ -93,12 +94,11 @@ void append_text(FileWriter& out, tbb::task_arena& arena, std::size_t count,
 ObjSink::ObjSink(std::string path, bool force, int threads, MeshLabelling labelling)
     : out_(std::move(path), force),
       faces_(open_scratch_beside(out_.path())),
-      arena_(threads > 0 ? threads : tbb::task_arena::automatic),
+      arena_(thread_count(threads)),
       labelling_(std::move(labelling)) {}
 
 std::uint64_t ObjSink::memory_with(int threads) {
-  return static_cast<std::uint64_t>(threads > 0 ? threads : tbb::info::default_concurrency()) *
-         kBatchText;
+  return static_cast<std::uint64_t>(thread_count(threads)) * kBatchText;
 }
 
 void ObjSink::begin(const MeshHeader& header) {

@@ -1,11 +1,10 @@
 #include "io/meshes/vtp_sink.h"
 
-#include <tbb/info.h>
-
 #include <algorithm>
 #include <span>
 #include <utility>
 
+#include "core/thread_count.h"
 #include "io/meshes/vtp_parts.h"
 
 namespace isobrick::inline v0 {
@@ -100,9 +99,7 @@ int PvtpSink::threads_within(int threads, std::uint64_t memory) {
   constexpr int most = 8;  // beyond, the disk bounds
   const auto affordable =
       static_cast<int>(std::min<std::uint64_t>(most, memory / 8 / memory_with(2)));
-  // More than there are cores gain nothing, and oneTBB would complain.
-  const int cores = tbb::info::default_concurrency();
-  return std::max(1, std::min({threads > 0 ? threads : cores, cores, affordable}));
+  return std::max(1, std::min(thread_count(threads), affordable));
 }
 
 std::uint64_t PvtpSink::memory_with(int threads, std::uint64_t part_triangles) {

@@ -1,5 +1,7 @@
 #include <array>
 #include <limits>
+#include <string>
+#include <thread>
 
 #include "tests/tools/program.h"
 
@@ -29,6 +31,24 @@ TEST_F(OutputMode, EverySubcommandHasHelpWithAnExample) {
     for (const char* part : {"Example:\n", "--json", "--quiet", "--help"})
       EXPECT_NE(outcome.out.find(part), std::string::npos) << command << " " << part;
   }
+}
+
+TEST_F(OutputMode, MoreThreadsThanCoresAreNoReasonToWarn) {
+  const std::string store = make_store("a");
+  const std::string threads = std::to_string(4 * std::thread::hardware_concurrency());
+  const auto expect_silent = [&](Arguments words) {
+    words.insert(words.end(), {"--threads", threads, "--quiet"});
+    const Outcome outcome = run(words);
+    EXPECT_EQ(outcome.exit_code, 0) << words[0];
+    EXPECT_EQ(outcome.err, "") << words[0] << " " << words.back();
+  };
+  for (const char* name : {"m.ply", "m.obj", "m.pvtp", "m.3dtiles"})
+    expect_silent({"extract", store, "--isovalue", "127.5", "-o", path(name)});
+  expect_silent({"extract", store, "--isovalue", "127.5", "--part", "1/1", "-o", path("m.piece")});
+  expect_silent({"merge", path("m.piece"), "-o", path("n.obj")});
+  expect_silent({"merge", path("m.piece"), "-o", path("n.ply"), "--simplify", "50%"});
+  expect_silent({"convert", store, path("b.zarr")});
+  expect_silent({"export", store, path("b.nrrd")});
 }
 
 TEST_F(OutputMode, InfoShowsTheStore) {

@@ -1,4 +1,5 @@
 #include "io/meshes/levels/level_fragments.h"
+#include "core/thread_count.h"
 
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
@@ -161,7 +162,7 @@ LoadedTriangles LevelFragments::load(const Run& run) {
 
 std::vector<EncodedFragment> LevelFragments::encode(LevelWriter& writer) {
   sort();
-  tbb::task_arena arena(work_.threads > 0 ? work_.threads : tbb::task_arena::automatic);
+  tbb::task_arena arena(thread_count(work_.threads));
   tbb::enumerable_thread_specific<Encoder> encoders(
       [&] { return Encoder(grid_, level_, writer.needs().halves); });
   std::vector<EncodedFragment> encoded;
