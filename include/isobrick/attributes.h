@@ -74,7 +74,7 @@ struct AttributeColours {
   std::string attribute;  ///< its name
   double low = 0;         ///< the value with the first colour, which smaller ones have, too
   double high = 1;        ///< the value with the last; not `low`, but it may be below it
-  ColourMap map = ColourMap::viridis;
+  ColourMap map = ColourMap::viridis;  ///< of values in between
 
   /// The colour of a value; grey of NaN.
   ISOBRICK_API VertexColour colour_of(float value) const;
