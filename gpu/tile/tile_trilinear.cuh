@@ -24,35 +24,14 @@ __device__ inline void load_cell(const TileShared& s, const TileParams& p, int x
   });
 }
 
-/// The inside bits of the four rows of samples around a row of cells.
-struct CellRow {
-  std::uint32_t at[4], next[4];  ///< samples 0 … 31, and 1 … 32
-
-  __device__ CellRow(const TileShared& s, int row) {
-#pragma unroll
-    for (int i = 0; i < 4; ++i) {
-      const RowBits& bits = s.rows[row + (i & 1) + 33 * (i >> 1)];
-      at[i] = bits.at;
-      next[i] = bits.next();
-    }
-  }
-  /// Cells with corners on both sides.
-  __device__ std::uint32_t active() const {
-    std::uint32_t any = 0, all = ~0u;
-#pragma unroll
-    for (int i = 0; i < 4; ++i) {
-      any |= at[i] | next[i];
-      all &= at[i] & next[i];
-    }
-    return any & ~all;
-  }
-  __device__ std::uint32_t case_of(int x) const {
-    std::uint32_t index = 0;
-#pragma unroll
-    for (int i = 0; i < 4; ++i) index |= ((at[i] >> x & 1u) | (next[i] >> x & 1u) << 1) << 2 * i;
-    return index;
-  }
-};
+/// The inside bits of the corners of the cell at `x` in the row.
+__device__ inline std::uint32_t case_at(const TileShared& s, int row, int x) {
+  const auto pair = [&](int step) {
+    const RowBits& bits = s.rows[row + step];
+    return (bits.at >> x & 1u) | (bits.next() >> x & 1u) << 1;
+  };
+  return pair(0) | pair(1) << 2 | pair(33) << 4 | pair(34) << 6;
+}
 
 /// Between classify_tile() and count_tile(): finds the cells, a row a warp, and counts what they
 /// make.
@@ -61,7 +40,8 @@ __device__ inline void find_patched(TileShared& s, const TileParams& p) {
   TrilinearWork& w = trilinear_work(p);
   const TopologyTables& tables = *p.trilinear.tables;
   if (threadIdx.x == 0) w.any = w.own_vertices = w.own_triangles = 0;
-  for (unsigned row = own_thread(); row < kRowsOfTile; row += N) w.cells[row] = 0;
+  for (unsigned row = own_thread(); row < kRowsOfTile; row += N)
+    w.cells[row] = w.triangles[row] = w.vertices[row] = 0;
   __syncthreads();
   const auto x = static_cast<int>(lane_id());
   for (auto r = static_cast<int>(warp_id()); r < 32 * 32; r += BlockConfig<N>::kWarps) {
@@ -69,11 +49,8 @@ __device__ inline void find_patched(TileShared& s, const TileParams& p) {
     if (s.shape.empty || y < s.shape.lo[1] || y >= s.shape.hi[1] || z < s.shape.lo[2] ||
         z >= s.shape.hi[2])
       continue;
-    const CellRow bits(s, row);
-    const std::uint32_t active = bits.active() & s.shape.cell_mask;
-    if (active == 0) continue;
-    const std::uint32_t index = bits.case_of(x);
-    bool needs_values = (active >> x & 1u) != 0 && tables.cases[index].needs_values;
+    const std::uint32_t index = case_at(s, row, x);
+    bool needs_values = (s.shape.cell_mask >> x & 1u) != 0 && tables.cases[index].needs_values;
     if constexpr (Nan) needs_values = needs_values && corners_at(nan_rows_of(s).rows, x, y, z) == 0;
     if (!__any_sync(kFullMask, needs_values)) continue;
     int patch = 0;
@@ -97,9 +74,6 @@ __device__ inline void find_patched(TileShared& s, const TileParams& p) {
   }
   __syncthreads();
   if (w.any == 0) return;
-  for (unsigned row = own_thread(); row < kRowsOfTile; row += N)
-    if (w.cells[row] == 0) w.triangles[row] = w.vertices[row] = 0;
-  __syncthreads();
   if (warp_id() == BlockConfig<N>::kVertices) {
     const std::uint32_t all = sum_rows(w.vertices);
     if (lane_id() == 0) w.own_vertices = all;
@@ -111,13 +85,13 @@ __device__ inline void find_patched(TileShared& s, const TileParams& p) {
   __syncthreads();
 }
 
-/// Of a row of cells the patched ones: a thread has that at its lane.
-struct PatchedRow {
+/// A cell of a row, each thread of a warp another one.
+struct PatchedCellOfRow {
   int x, y, z, row;
   CellPatch patch;         ///< empty where the cell is not patched
   std::uint32_t vertices;  ///< the number in the tile of the cell's first vertex among such
 
-  __device__ PatchedRow(const TrilinearWork& w, const TopologyTables& tables, int r)
+  __device__ PatchedCellOfRow(const TrilinearWork& w, const TopologyTables& tables, int r)
       : x(static_cast<int>(lane_id())), y(r % 32), z(r / 32), row(33 * z + y) {
     if (w.cells[row] >> x & 1u) patch = tables.patches[w.patches[32 * r + x]];
     vertices = w.vertices[row] + (warp_inclusive_sum(patch.inner) - patch.inner);
@@ -129,12 +103,12 @@ template <int N, class T, bool Normals>
 __device__ inline void write_inner_vertices(const TileShared& s, const TileParams& p) {
   const TrilinearWork& w = trilinear_work(p);
   const std::uint64_t first = s.vertex_base + s.all_vertices;
-  if (w.own_vertices == 0 || first + w.own_vertices > p.vertex_capacity) return;
+  if (s.extra_vertices == 0 || first + s.extra_vertices > p.vertex_capacity) return;
   using Maker = VertexMaker<T>;
   const Maker maker{s, p, static_cast<typename Maker::R>(p.isovalue)};
   for (auto r = static_cast<int>(warp_id()); r < 32 * 32; r += BlockConfig<N>::kWarps) {
     if (w.cells[33 * (r / 32) + r % 32] == 0) continue;
-    const PatchedRow cell(w, *p.trilinear.tables, r);
+    const PatchedCellOfRow cell(w, *p.trilinear.tables, r);
     if (cell.patch.inner == 0) continue;
     double d[8];
     load_cell<T>(s, p, cell.x, cell.y, cell.z, d);
@@ -171,7 +145,7 @@ __device__ inline void write_patched_triangles(const TileShared& s, const TilePa
   const int second = p.world.mirrored ? 2 : 1;
   for (auto r = static_cast<int>(warp_id()); r < 32 * 32; r += BlockConfig<N>::kWarps) {
     if (w.cells[33 * (r / 32) + r % 32] == 0) continue;
-    const PatchedRow cell(w, tables, r);
+    const PatchedCellOfRow cell(w, tables, r);
     const std::uint32_t count = cell.patch.triangles;
     Triangle* to = first + w.triangles[cell.row] + (warp_inclusive_sum(count) - count);
     const auto x = static_cast<std::uint32_t>(cell.x);
