@@ -356,13 +356,17 @@ void check_space(const std::vector<ExtractedSurface>& surfaces, const StoreReade
 }
 
 bool need_pieces(const std::vector<ExtractedSurface>& surfaces, const StoreReader& store) {
+  // Three edges from each sample, three vertices within its cell, and one on itself.
+  constexpr std::uint64_t vertices_of_sample = 7;
   return std::any_of(surfaces.begin(), surfaces.end(), [&](const ExtractedSurface& surface) {
-    // Mostly all that the active cells could hold is little, which is known without a sample.
     const ExtractOptions& options = surface.options;
-    PlannedMesh mesh{
-        .form = surface.form,
-        .size = largest_mesh(count_active(store, options), options.topology, options.cap),
-        .filter = surface.filter};
+    PlannedMesh mesh{.form = surface.form, .filter = surface.filter};
+    // Mostly the volume is too small, which is known without a range, or its active cells are too
+    // few, which is known without a sample.
+    const Lattice& lattice = store.info().levels[static_cast<std::size_t>(options.level)].lattice;
+    mesh.size.vertices = vertices_of_sample * static_cast<std::uint64_t>(volume(lattice.extent));
+    if (!needs_pieces(mesh, kMaxNarrowVertices)) return false;
+    mesh.size = largest_mesh(count_active(store, options), options.topology, options.cap);
     if (!needs_pieces(mesh, kMaxNarrowVertices)) return false;
     const ExtractEstimate guess = estimate_one(surface, store);
     mesh.size = guess.mesh;
