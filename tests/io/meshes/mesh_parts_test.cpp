@@ -198,6 +198,31 @@ TEST(WideMeshes, AreRefusedByOtherFormats) {
   EXPECT_FALSE(PlySink(dir / "a.ply", false).takes_wide());
 }
 
+/// A run that borrows much is cut in the file as well, and such files can be replaced.
+TEST(Pvtp, ARunMayBeSeveralFiles) {
+  const TempDir dir;
+  std::mt19937 random(5);
+  Chunks chunks;
+  for (std::uint32_t i = 0; i < 150'000; ++i) {
+    std::uniform_int_distribution<std::uint32_t> any(0, i);
+    chunks.mesh.positions.push_back({static_cast<float>(i), 0, 0});
+    chunks.mesh.triangles.push_back({i, any(random), any(random)});
+  }
+  chunks.ends = {{chunks.mesh.positions.size(), chunks.mesh.triangles.size()}};
+  for (const int threads : {1, 2}) {
+    PvtpSink sink(dir / "a.pvtp", true, 100'000, threads);
+    write(sink, chunks, false);
+    const PvtpFile file = read_pvtp(dir.read("a.pvtp"), dir / ".");
+    EXPECT_GT(file.parts, 2u);
+    EXPECT_TRUE(contains(dir.read("a.pvtp"), "/part_1_1.vtp"));
+    ASSERT_EQ(file.mesh.triangles.size(), chunks.mesh.triangles.size());
+    for (std::size_t i = 0; i < file.mesh.triangles.size(); ++i)
+      for (std::size_t corner = 0; corner < 3; ++corner)
+        ASSERT_EQ(file.ids[file.mesh.triangles[i][corner]], chunks.mesh.triangles[i][corner]) << i;
+  }
+  EXPECT_EQ(dir.list(), (std::vector<std::string>{"a.pvtp", "a.pvtp.parts-2"}));
+}
+
 TEST(Pvtp, GlobalIdsAreNumbersInTheWholeMesh) {
   const TempDir dir;
   const Chunks chunks = make_chunks(500);
