@@ -3,11 +3,6 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <cstring>
-
-#include <isobrick/error.h>
-#include "surface/patched_cells.h"
-#include "surface/sample_vertices.h"
 
 namespace isobrick::inline v0 {
 namespace {
@@ -84,20 +79,7 @@ struct BorderRow {
   }
 };
 
-/// Whether the inside is in one piece on an ambiguous face of the cell at (x, y, z), as the cell
-/// itself resolves it.
-template <class T>
-bool is_joined(const KernelContext& context, const TileState& tile, int x, int y, int z, int face) {
-  const bool below = context.inside == Inside::below;
-  if (!context.trilinear) return !below;
-  const CellValues<T> values(reinterpret_cast<const T*>(tile.samples.data()), context.isovalue, x,
-                             y, z);
-  const auto& c = case_rule::kFaces[face];
-  return cell_topology::joins_inside(values.d[c[0]], values.d[c[1]], values.d[c[2]],
-                                     values.d[c[3]]) != below;
-}
-
-/// Lists the faces of a row of cells that have a part inside, and marks their samples there.
+/// Lists the faces of a row of cells that have triangles, and marks the samples at their corners.
 template <class T>
 void list_faces(const KernelContext& context, TileState& tile, int y, int z) {
   const BorderRow border(tile, y, z);
@@ -111,19 +93,27 @@ void list_faces(const KernelContext& context, TileState& tile, int y, int z) {
     std::uint32_t corners = 0;
     for (int i = 0; i < 4; ++i) corners |= static_cast<std::uint32_t>(rows[i] >> x & 3) << 2 * i;
     if (corners == 0) continue;
+    const std::uint32_t at =
+        tile.coincident ? coincident::corner_bits(tile.coincident->at, x, y, z) : 0;
+    const auto use = [&](int vertex) {
+      if (vertex >= 8) return;
+      const int row = row_index(y + (vertex >> 1 & 1), z + (vertex >> 2));
+      tile.on_samples->used[row] |= std::uint64_t{1} << (x + (vertex & 1));
+    };
     for (int f = 0; f < 6; ++f) {
       if (!(border.faces[f] >> bit & 1)) continue;
-      std::uint32_t polygon = 0;
-      for (int i = 0; i < 4; ++i) {
-        const int c = case_rule::kFaces[f][i];
-        if (!(corners >> c & 1)) continue;
-        polygon |= 1u << i;
-        cap.used[row_index(y + (c >> 1 & 1), z + (c >> 2))] |= std::uint64_t{1} << (x + (c & 1));
-      }
-      if (polygon == 0) continue;
-      if ((polygon == 5 || polygon == 10) && !is_joined<T>(context, tile, x, y, z, f))
-        polygon += 16;
-      cap.triangles += kCapPolygons[polygon].triangles;
+      const std::uint32_t polygon = polygon_of<T>(context, tile, x, y, z, f, corners);
+      std::uint32_t kept = 0;
+      const std::uint32_t left_out = for_each_cap_triangle(static_cast<std::uint32_t>(f), polygon,
+                                                           at, [&](int a, int b, int c) {
+                                                             use(a);
+                                                             use(b);
+                                                             use(c);
+                                                             ++kept;
+                                                           });
+      if (tile.coincident) tile.coincident->left_out += left_out;
+      if (kept == 0) continue;
+      cap.triangles += kept;
       cap.faces.resize(cap.faces.size() + 1);
       cap.faces[cap.faces.size() - 1] =
           static_cast<CapFace>(x | y << 5 | z << 10 | f << 15) | polygon << 18;
@@ -131,71 +121,21 @@ void list_faces(const KernelContext& context, TileState& tile, int y, int z) {
   }
 }
 
-/// Whether other tiles have the sample at a place as well.
-bool is_shared(const KernelContext& context, const TileShape& shape, std::uint32_t place) {
-  for (int axis = 0; axis < 3; ++axis) {
-    const auto i = static_cast<int>(place >> 6 * axis & 63);
-    if (i == 0 && !shape.first[axis]) return true;
-    if (i == kLast && context.border.hi[axis] - 1 > shape.origin[axis] + kLast) return true;
-  }
-  return false;
-}
+}  // namespace
 
-bool exists(const ExistingCells& cells, Index x, Index y, Index z) {
-  return cells.at(static_cast<int>(y), static_cast<int>(z)) >> (x + 1) & 1;
-}
-
-/// Whether a cell that exists has a border face at its corner. Only the cells around the sample
-/// matter, because a face there lies between two of them.
-bool has_border_face(const ExistingCells& cells, Int3 cell, int corner) {
-  if (!exists(cells, cell.x, cell.y, cell.z)) return false;
-  for (int axis = 0; axis < 3; ++axis) {
-    Int3 other = cell;
-    other[axis] += corner >> axis & 1 ? 1 : -1;
-    if (!exists(cells, other.x, other.y, other.z)) return true;
-  }
-  return false;
-}
-
-/// Lists the samples of the faces in the order of their places and numbers the tile's own. The
-/// first tile that has a border face at a sample makes its vertex.
-void list_vertices(const KernelContext& context, bool unwelded, TileState& tile) {
-  TileCap& cap = *tile.cap;
-  for (int row = 0; row < kTileRows; ++row) {
-    cap.first[row] = static_cast<std::uint32_t>(cap.vertices.size());
-    for (std::uint64_t word = cap.used[row]; word; word &= word - 1) {
-      const int x = std::countr_zero(word), y = row % kTileSamples, z = row / kTileSamples;
-      SampleVertex vertex{static_cast<std::uint32_t>(x | y << 6 | z << 12), 0, SampleVertex::kOwn};
-      if (!unwelded && is_shared(context, tile.shape, vertex.place))
-        vertex.owner = first_tile_at(tile.work.tile, {x, y, z}, [&](Int3 cell, int corner) {
-          return has_border_face(cap.cells, cell, corner);
-        });
-      if (vertex.owner == SampleVertex::kOwn) vertex.number = tile.vertices + cap.own++;
-      cap.vertices.resize(cap.vertices.size() + 1);
-      cap.vertices[cap.vertices.size() - 1] = vertex;
+CapNormals::CapNormals(const KernelContext& context) {
+  const double sign = context.inside == Inside::below ? -1 : 1;  // the map's normals are reversed
+  for (int a = 0; a < 3; ++a) {
+    double n[3], length = 0;
+    for (int row = 0; row < 3; ++row) {
+      n[row] = sign * static_cast<double>(context.world.normal[3 * row + a]);
+      length += n[row] * n[row];
     }
+    for (int row = 0; row < 3; ++row) axis_[a][row] = n[row] / std::sqrt(length);
   }
 }
 
-/// The unit normals of faces across each axis, towards larger indices, in world space.
-struct AxisNormals {
-  double axis[3][3];
-
-  explicit AxisNormals(const KernelContext& context) {
-    const double sign = context.inside == Inside::below ? -1 : 1;  // the map's normals are reversed
-    for (int a = 0; a < 3; ++a) {
-      double n[3], length = 0;
-      for (int row = 0; row < 3; ++row) {
-        n[row] = sign * static_cast<double>(context.world.normal[3 * row + a]);
-        length += n[row] * n[row];
-      }
-      for (int row = 0; row < 3; ++row) axis[a][row] = n[row] / std::sqrt(length);
-    }
-  }
-};
-
-/// The normal at a sample of the border. Where the faces' normals cancel out, that of one of them.
-Vec3f cap_normal(const AxisNormals& normals, const ExistingCells& cells, int x, int y, int z) {
+Vec3f CapNormals::at(const ExistingCells& cells, int x, int y, int z) const {
   int sum[3] = {0, 0, 0}, any[3] = {0, 0, 0};
   for (int c = 0; c < 8; ++c) {
     const int at[3] = {x - 1 + (c & 1), y - 1 + (c >> 1 & 1), z - 1 + (c >> 2)};
@@ -212,15 +152,13 @@ Vec3f cap_normal(const AxisNormals& normals, const ExistingCells& cells, int x, 
   const int(&n)[3] = sum[0] || sum[1] || sum[2] ? sum : any;
   double v[3] = {0, 0, 0}, length = 0;
   for (int row = 0; row < 3; ++row) {
-    for (int axis = 0; axis < 3; ++axis) v[row] += n[axis] * normals.axis[axis][row];
+    for (int axis = 0; axis < 3; ++axis) v[row] += n[axis] * axis_[axis][row];
     length += v[row] * v[row];
   }
   length = std::sqrt(length);
   return {static_cast<float>(v[0] / length), static_cast<float>(v[1] / length),
           static_cast<float>(v[2] / length)};
 }
-
-}  // namespace
 
 CapBounds cap_bounds(const SurfaceOptions& options) {
   if (!options.cap) return {};
@@ -236,53 +174,21 @@ CapBounds cap_bounds(const SurfaceOptions& options) {
   return {planes * edge * edge, planes * samples * samples, planes * 4 * edge};
 }
 
-void check_cap(const SurfaceOptions& options) {
-  if (options.cap && options.drop_degenerate)
-    throw UsageError(
-        "a capped surface keeps its degenerate triangles; use either --cap or --drop-degenerate");
-}
-
-void count_cap(ScalarType type, const KernelContext& context, bool unwelded, TileState& tile) {
+void count_cap(ScalarType type, const KernelContext& context, TileState& tile) {
   TileCap& cap = *tile.cap;
   cap.clear();
   const Box3 around{tile.shape.origin - Int3{1, 1, 1},
                     tile.shape.origin + Int3{kTileSamples + 1, kTileSamples + 1, kTileSamples + 1}};
-  if (!context.may_have_nan && intersect(around, context.border) == around) return;
+  cap.near = context.may_have_nan || intersect(around, context.border) != around;
+  if (!cap.near) return;
   find_cells(context, tile);
-  std::memset(cap.used, 0, sizeof cap.used);
   visit_scalar(type, [&](auto tag) {
     using T = typename decltype(tag)::type;
     if (std::is_floating_point_v<T> && context.may_have_nan) leave_out_nan<T>(context, tile);
     for (int z = tile.shape.lo[2]; z < tile.shape.hi[2]; ++z)
       for (int y = tile.shape.lo[1]; y < tile.shape.hi[1]; ++y) list_faces<T>(context, tile, y, z);
   });
-  list_vertices(context, unwelded, tile);
-  tile.vertices += cap.own;
   tile.triangles += cap.triangles;
-}
-
-void publish_cap(const KernelContext& context, TileState& tile) {
-  publish_samples(
-      tile.cap->vertices.span(),
-      [&](std::uint32_t place) { return is_shared(context, tile.shape, place); },
-      tile.boundary->cap);
-}
-
-void adopt_cap(TileState& tile, const BoundaryMap& map) {
-  adopt_samples(tile, &TileBoundary::cap, map, tile.cap->vertices);
-}
-
-void write_cap_vertices(const KernelContext& context, const TileState& tile, Vec3f* positions,
-                        Vec3f* normals) {
-  const AxisNormals of_axes(context);
-  for (const SampleVertex& vertex : tile.cap->vertices) {
-    if (vertex.owner != SampleVertex::kOwn) continue;
-    const int x = vertex.place & 63, y = vertex.place >> 6 & 63, z = vertex.place >> 12 & 63;
-    const Int3 at = tile.shape.origin + Int3{x, y, z};
-    *positions++ = context.world.position(
-        {static_cast<float>(at.x), static_cast<float>(at.y), static_cast<float>(at.z)});
-    if (normals) *normals++ = cap_normal(of_axes, tile.cap->cells, x, y, z);
-  }
 }
 
 }  // namespace isobrick

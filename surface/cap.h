@@ -3,8 +3,9 @@
 #include <array>
 #include <cstdint>
 
-#include "surface/boundary_map.h"
 #include "surface/cap_bounds.h"
+#include "surface/coincident_vertices.h"
+#include "surface/patched_cells.h"
 #include "surface/tile_kernels.h"
 
 // Caps: what closes a surface at the border. A border face is a cell face between a cell that
@@ -51,19 +52,76 @@ constexpr std::array<CapPolygon, 32> make_cap_polygons() {
 }
 inline constexpr auto kCapPolygons = make_cap_polygons();
 
-/// After the other counts: finds the border faces and their vertices on samples, the tile that
-/// makes each one, and completes the counts. `unwelded`: no tile shares vertices with another.
-void count_cap(ScalarType type, const KernelContext& context, bool unwelded, TileState& tile);
+/// Calls f(a, b, c) with the vertices of each triangle of a polygon on a face that is no degenerate
+/// one, as coincident::vertex_on() names them; the number of the others. `at`: the coincident
+/// vertices among the cell's corners, none where degenerate triangles stay.
+template <class F>
+constexpr std::uint32_t for_each_cap_triangle(std::uint32_t face, std::uint32_t polygon,
+                                              std::uint32_t at, F&& f) {
+  const auto& corners = case_rule::kFaces[face];
+  const auto vertex = [&](std::uint8_t corner) -> int {
+    const int c = corners[corner & 3];
+    if (corner < 4) return c;
+    return coincident::vertex_on(case_rule::edge_between(c, corners[(corner + 1) & 3]), at);
+  };
+  const CapPolygon& of = kCapPolygons[polygon];
+  std::uint32_t left_out = 0;
+  for (std::size_t t = 0; t < of.triangles; ++t) {
+    const int a = vertex(of.corners[3 * t]), b = vertex(of.corners[3 * t + 1]),
+              c = vertex(of.corners[3 * t + 2]);
+    if (a != b && b != c && c != a)
+      f(a, b, c);
+    else
+      ++left_out;
+  }
+  return left_out;
+}
 
-/// Copies the tile's own vertices that others may use to its boundary.
-void publish_cap(const KernelContext& context, TileState& tile);
+/// Whether a cell, each coordinate in −1 … 32, exists.
+inline bool exists(const ExistingCells& cells, Index x, Index y, Index z) {
+  return cells.at(static_cast<int>(y), static_cast<int>(z)) >> (x + 1) & 1;
+}
 
-/// Turns the numbers of the cap's vertices into those of the mesh.
-void adopt_cap(TileState& tile, const BoundaryMap& map);
+/// Whether a face of a cell that exists is a border face.
+inline bool is_border_face(const ExistingCells& cells, Int3 cell, int face) {
+  cell[face / 2] += face % 2 != 0 ? 1 : -1;
+  return !exists(cells, cell.x, cell.y, cell.z);
+}
 
-/// Writes the tile's own vertices of the cap, and their normals unless null. A normal is the sum of
-/// those of the border faces around the sample.
-void write_cap_vertices(const KernelContext& context, const TileState& tile, Vec3f* positions,
-                        Vec3f* normals);
+/// The polygon on a face of the cell at (x, y, z), whose corners inside are bits.
+template <class T>
+std::uint32_t polygon_of(const KernelContext& context, const TileState& tile, int x, int y, int z,
+                         int face, std::uint32_t inside) {
+  const auto& c = case_rule::kFaces[face];
+  std::uint32_t polygon = 0;
+  for (int i = 0; i < 4; ++i) polygon |= (inside >> c[i] & 1) << i;
+  if (polygon != 5 && polygon != 10) return polygon;
+  // Whether the inside is in one piece there, as the cell itself resolves it.
+  const bool below = context.inside == Inside::below;
+  bool joined = !below;
+  if (context.trilinear) {
+    const CellValues<T> values(reinterpret_cast<const T*>(tile.samples.data()), context.isovalue, x,
+                               y, z);
+    joined = cell_topology::joins_inside(values.d[c[0]], values.d[c[1]], values.d[c[2]],
+                                         values.d[c[3]]) != below;
+  }
+  return joined ? polygon : polygon + 16;
+}
+
+/// After the other counts: finds the border faces, marks the samples that their triangles have
+/// corners on, and completes the counts of triangles.
+void count_cap(ScalarType type, const KernelContext& context, TileState& tile);
+
+/// The normals of a cap's vertices on samples, in world space.
+class CapNormals {
+ public:
+  explicit CapNormals(const KernelContext& context);
+  /// The sum of the normals of the border faces around a sample; where they cancel out, that of
+  /// one of them.
+  Vec3f at(const ExistingCells& cells, int x, int y, int z) const;
+
+ private:
+  double axis_[3][3];  ///< of faces across each axis, towards larger indices
+};
 
 }  // namespace isobrick

@@ -17,7 +17,4 @@ struct CapBounds {
 };
 CapBounds cap_bounds(const SurfaceOptions& options);
 
-/// Throws UsageError for options that caps do not go with.
-void check_cap(const SurfaceOptions& options);
-
 }  // namespace isobrick

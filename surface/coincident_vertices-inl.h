@@ -1,5 +1,4 @@
-// Coincident vertices, where degenerate triangles are left out; included once for every SIMD
-// target.
+// The triangles of cells with coincident vertices; included once for every SIMD target.
 
 #if defined(ISOBRICK_COINCIDENT_VERTICES_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef ISOBRICK_COINCIDENT_VERTICES_INL_H_
@@ -11,23 +10,11 @@
 #include <bit>
 
 #include "surface/coincident_vertices.h"
-#include "surface/tile_vertices-inl.h"
+#include "surface/sample_vertices-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace isobrick::inline v0 {
 namespace HWY_NAMESPACE {
-
-/// Writes the tile's own vertices on coincident vertices. Their normals are those of the samples.
-template <class T>
-void write_coincident_vertices(const KernelContext& context, const TileState& tile,
-                               Vec3f* positions, Vec3f* normals) {
-  const ScalarVertices<T> scalar{context, tile};
-  for (const SampleVertex& vertex : tile.coincident->vertices) {
-    if (vertex.owner != SampleVertex::kOwn) continue;
-    scalar.write_sample(vertex.place, positions++, normals);
-    if (normals) ++normals;
-  }
-}
 
 /// The number of the vertex on an active edge of the cell at (x, y, z).
 inline std::uint32_t edge_number(const TileState& tile, int x, int y, int z, int edge) {
@@ -45,17 +32,6 @@ inline std::uint32_t edge_number(const TileState& tile, int x, int y, int z, int
   return axis == 1 ? row.y_base + count(row.y, sample - 1) : row.z_base + count(row.z, sample - 1);
 }
 
-/// The number of the vertex on corner `corner` of the cell at (x, y, z), a used coincident vertex.
-inline std::uint32_t coincident_number(const CoincidentVertices& coincident, int x, int y, int z,
-                                       int corner) {
-  const int row = row_index(y + (corner >> 1 & 1), z + (corner >> 2));
-  const std::uint64_t before = (std::uint64_t{1} << (x + (corner & 1))) - 1;
-  return coincident
-      .vertices[coincident.first[row] +
-                static_cast<std::uint32_t>(std::popcount(coincident.used[row] & before))]
-      .number;
-}
-
 /// Writes the triangles of cells with a coincident vertex.
 inline void write_kept_triangles(const CaseTables& tables, const TileState& tile, Triangle* out) {
   const CoincidentVertices& coincident = *tile.coincident;
@@ -63,7 +39,7 @@ inline void write_kept_triangles(const CaseTables& tables, const TileState& tile
     const int x = static_cast<int>(cell & 31), y = static_cast<int>(cell >> 5 & 31),
               z = static_cast<int>(cell >> 10 & 31);
     const auto number = [&](int vertex) {
-      return vertex < 8 ? coincident_number(coincident, x, y, z, vertex)
+      return vertex < 8 ? sample_number(*tile.on_samples, x, y, z, vertex)
                         : edge_number(tile, x, y, z, vertex - 8);
     };
     coincident::for_each_kept(tables, cell >> 16, coincident::corner_bits(coincident.at, x, y, z),

@@ -4,10 +4,10 @@
 #include <optional>
 #include <utility>
 
-#include "surface/boundary_map.h"
 #include "surface/case_tables.h"
 #include "surface/cell_math.h"
 #include "surface/tile_kernels.h"
+#include "surface/tile_state.h"
 
 // Leaving degenerate triangles out. Where a sample equals the isovalue, the vertices
 // of all active edges around it coincide. Here they become one vertex, a *coincident vertex*, and
@@ -85,17 +85,8 @@ constexpr std::uint32_t corner_bits(const std::uint64_t* rows, int x, int y, int
 
 }  // namespace coincident
 
-/// After count_tile and count_patched_cells: leaves triangles out, finds the coincident vertices
-/// that the rest has corners on and the tile that makes each one's vertex, and completes the
-/// counts. `unwelded`: no tile shares vertices with another.
-void count_coincident(ScalarType type, const KernelContext& context, bool unwelded,
-                      TileState& tile);
-
-/// Copies the tile's own vertices on coincident vertices on its planes to its boundary.
-void publish_coincident(TileState& tile);
-
-/// Turns the numbers of vertices on coincident vertices into those of the mesh; vertices of tiles
-/// before are asked for.
-void adopt_coincident(TileState& tile, const BoundaryMap& map);
+/// After count_tile and count_patched_cells: leaves triangles out, marks the coincident vertices
+/// that the rest has corners on, and completes the counts of triangles.
+void count_coincident(TileState& tile);
 
 }  // namespace isobrick

@@ -18,6 +18,7 @@
 #include "surface/chunk_writer.h"
 #include "surface/coincident_vertices.h"
 #include "surface/patched_cells.h"
+#include "surface/sample_vertices.h"
 #include "surface/tile_kernels.h"
 #include "surface/tile_samples.h"
 #include "surface/world_map.h"
@@ -35,7 +36,7 @@ std::uint64_t boundary_bytes_of_tile(bool drop_degenerate, const CapBounds& cap)
   // Any sample on a tile's six planes may be a coincident vertex.
   constexpr std::uint64_t inner = kTileSamples - 2;
   constexpr std::uint64_t planes = kTileSamples * kTileRows - inner * inner * inner;
-  return 3072 + ((drop_degenerate ? planes : 0) + cap.shared) * sizeof(SharedSample);
+  return 3072 + (drop_degenerate ? planes : cap.shared) * sizeof(SharedSample);
 }
 
 /// Edges of a tile: three from each sample.
@@ -78,7 +79,6 @@ struct CpuExtractor::Impl {
     options.roi = intersect(o.roi, l.box());
     if (std::isnan(o.isovalue)) throw UsageError("the isovalue is not a number");
     if (options.roi.empty()) throw UsageError("the region of interest holds no sample");
-    check_cap(o);
     options.may_have_nan = o.may_have_nan && is_floating(l.type);
     options.drop_degenerate = o.drop_degenerate && has_coincident(l.type, o.isovalue);
     context = {.isovalue = o.isovalue,
@@ -135,6 +135,10 @@ struct CpuExtractor::Impl {
       state.coincident = options.drop_degenerate ? std::make_unique<CoincidentVertices>() : nullptr;
     if (options.cap != (state.cap != nullptr))
       state.cap = options.cap ? std::make_unique<TileCap>() : nullptr;
+    const bool on_samples = options.drop_degenerate || options.cap;
+    if (on_samples != (state.on_samples != nullptr))
+      state.on_samples = on_samples ? std::make_unique<SampleVertices>() : nullptr;
+    if (on_samples) state.on_samples->clear();
     if (!shape_tile(state.shape, work.tile)) {
       state.clear_rows();
       if (state.coincident) state.coincident->clear();
@@ -144,13 +148,13 @@ struct CpuExtractor::Impl {
       gather(state, samples);
       count_tile(lattice.type, kernels, state);
       if (kernels.trilinear) count_patched_cells(lattice.type, kernels, state);
-      if (state.coincident) count_coincident(lattice.type, kernels, !welded(), state);
-      if (state.cap) count_cap(lattice.type, kernels, !welded(), state);
+      if (state.coincident) count_coincident(state);
+      if (state.cap) count_cap(lattice.type, kernels, state);
+      if (on_samples) list_sample_vertices(lattice.type, kernels, !welded(), state);
     }
     if (!state.boundary) return;
     publish_boundary(state);
-    if (state.coincident) publish_coincident(state);
-    if (state.cap) publish_cap(kernels, state);
+    if (on_samples) publish_sample_vertices(kernels, state);
   }
 
   template <class F>
@@ -205,8 +209,7 @@ struct CpuExtractor::Impl {
   void write(TileState& state) {
     if (state.vertices == 0 && state.triangles == 0) return;
     adopt_boundaries(state, boundaries);
-    if (state.coincident) adopt_coincident(state, boundaries);
-    if (state.cap) adopt_cap(state, boundaries);
+    if (state.on_samples) adopt_sample_vertices(state, boundaries);
     write_tile(lattice.type, context, state, mesh.positions.data() + state.vertex_base,
                options.normals ? mesh.normals.data() + state.vertex_base : nullptr,
                mesh.triangles.data() + state.triangle_base);
@@ -352,19 +355,19 @@ MeshSize CpuExtractor::max_in_cell(Topology topology) {
 // boundary, which waits at least until the batch is over.
 std::uint64_t CpuExtractor::workspace_bytes(ScalarType type, bool drop_degenerate,
                                             Topology topology, const CapBounds& cap) {
-  const std::uint64_t coincident = sizeof(CoincidentVertices) +
-                                   kTileRows * kTileSamples * sizeof(SampleVertex) +
-                                   kTileVolume * sizeof(ActiveCell);
-  // Its lists grow by halves.
-  const std::uint64_t cap_bytes =
-      cap.faces == 0
-          ? 0
-          : sizeof(TileCap) +
-                (cap.faces * sizeof(CapFace) + cap.vertices * sizeof(SampleVertex)) * 3 / 2;
-  return sizeof(TileState) + boundary_bytes_of_tile(drop_degenerate, cap) + cap_bytes +
-         TileLayout::kSize * size_of(type) + kTileVolume * sizeof(ActiveCell) +
+  const std::uint64_t coincident =
+      drop_degenerate ? sizeof(CoincidentVertices) + kTileVolume * sizeof(ActiveCell) : 0;
+  // Lists of caps and of vertices on samples grow by halves.
+  const std::uint64_t faces =
+      cap.faces == 0 ? 0 : sizeof(TileCap) + cap.faces * sizeof(CapFace) * 3 / 2;
+  const std::uint64_t samples =
+      drop_degenerate ? std::uint64_t{kTileRows} * kTileSamples : cap.vertices;
+  const std::uint64_t on_samples =
+      samples == 0 ? 0 : sizeof(SampleVertices) + samples * sizeof(SampleVertex) * 3 / 2;
+  return sizeof(TileState) + boundary_bytes_of_tile(drop_degenerate, cap) + coincident + faces +
+         on_samples + TileLayout::kSize * size_of(type) + kTileVolume * sizeof(ActiveCell) +
          (topology == Topology::trilinear ? kTileVolume * sizeof(PatchedCell) : 0) +
-         kMaxEdges * sizeof(std::uint32_t) + (drop_degenerate ? coincident : 0);
+         kMaxEdges * sizeof(std::uint32_t);
 }
 
 std::uint64_t CpuExtractor::boundary_bytes(Int3 tiles, bool drop_degenerate, const CapBounds& cap) {

@@ -78,7 +78,7 @@ inline void write_kept_patched_triangles(bool mirrored, const TileState& tile, T
     const int x = static_cast<int>(cell.cell & 31), y = static_cast<int>(cell.cell >> 5 & 31),
               z = static_cast<int>(cell.cell >> 10 & 31);
     const auto number = [&](int vertex) {
-      if (vertex < 8) return coincident_number(*tile.coincident, x, y, z, vertex);
+      if (vertex < 8) return sample_number(*tile.on_samples, x, y, z, vertex);
       const int corner = vertex - 8;
       return corner < kFirstInner ? edge_number(tile, x, y, z, corner)
                                   : inner + static_cast<std::uint32_t>(corner - kFirstInner);

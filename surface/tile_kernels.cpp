@@ -14,6 +14,7 @@
 #include "surface/case_tables.h"
 #include "surface/coincident_vertices-inl.h"
 #include "surface/patched_cells-inl.h"
+#include "surface/sample_vertices-inl.h"
 #include "surface/tile_count-inl.h"
 #include "surface/tile_triangles-inl.h"
 #include "surface/tile_vertices-inl.h"
@@ -39,13 +40,9 @@ void Write(ScalarType type, const KernelContext& context, TileState& tile, Vec3f
       write_from(tile.edge_vertices, [&](Vec3f* to, Vec3f* normals_to) {
         write_inner_vertices<T>(context, tile, to, normals_to);
       });
-    if (tile.coincident)
+    if (tile.on_samples && tile.on_samples->own > 0)
       write_from(tile.edge_vertices + tile.inner_vertices, [&](Vec3f* to, Vec3f* normals_to) {
-        write_coincident_vertices<T>(context, tile, to, normals_to);
-      });
-    if (tile.cap_triangles() > 0)
-      write_from(tile.vertices - tile.cap->own, [&](Vec3f* to, Vec3f* normals_to) {
-        write_cap_vertices(context, tile, to, normals_to);
+        write_sample_vertices<T>(context, tile, to, normals_to);
       });
   });
   const CaseTables& tables = context.world.mirrored ? kMirroredCaseTables : kCaseTables;

@@ -80,36 +80,45 @@ struct TileBoundary {
   /// Rows with y = 32 (by z) and rows with z = 32 (by y); numbers count from `base`.
   std::array<EdgeRow, kTileSamples> y_face, z_face;
   PodBuffer<FaceVertex> x_face_y, x_face_z;  ///< edges along y and along z at x = 32
-  PodBuffer<SharedSample> coincident;        ///< coincident vertices, by place
-  PodBuffer<SharedSample> cap;               ///< vertices of caps, by place
+  PodBuffer<SharedSample> on_samples;        ///< vertices on samples, by place
 };
 
-/// A vertex on a sample that triangles of a tile have corners on: a coincident vertex
-/// (coincident_vertices.h) or one of a cap (cap.h).
+/// A vertex on a sample that triangles of a tile have corners on.
 struct SampleVertex {
   static constexpr std::uint8_t kOwn = 13;
   std::uint32_t place;  ///< x | y << 6 | z << 12
   std::uint32_t number;
   std::uint8_t owner;  ///< which of the 27 tiles around this one makes it; kOwn: this one
+  bool of_surface;     ///< whether triangles of the surface meet there, and not only the cap's
+};
+
+/// The vertices of a tile on samples: coincident ones (coincident_vertices.h) and those of caps
+/// (cap.h).
+struct SampleVertices {
+  std::uint64_t used[kTileRows];     ///< bit x: a triangle of this tile has a corner on sample x
+  std::uint32_t first[kTileRows];    ///< which of `vertices` is the row's first
+  PodBuffer<SampleVertex> vertices;  ///< the used ones, by place
+  std::uint32_t own = 0;             ///< of the vertices made by this tile
+
+  void clear() {
+    std::fill(std::begin(used), std::end(used), 0);
+    vertices.clear();
+    own = 0;
+  }
 };
 
 /// The coincident vertices of a tile, where degenerate triangles are left out.
 struct CoincidentVertices {
   /// Bit x: sample x is a coincident vertex. A row and a sample more than there are, always 0.
   std::uint64_t at[kTileRows + kTileSamples + 1] = {};
-  std::uint64_t used[kTileRows];     ///< bit x: a triangle of this tile has a corner on sample x
-  std::uint32_t first[kTileRows];    ///< which of `vertices` is the row's first
-  PodBuffer<SampleVertex> vertices;  ///< the used ones, by place
-  PodBuffer<ActiveCell> cells;       ///< with a coincident vertex; they are not in TileState::cells
-  std::uint32_t triangles = 0;       ///< of these cells that are kept
-  std::uint32_t own = 0;             ///< of the vertices made by this tile
-  std::uint32_t left_out = 0;        ///< triangles
+  PodBuffer<ActiveCell> cells;  ///< with a coincident vertex; they are not in TileState::cells
+  std::uint32_t triangles = 0;  ///< of these cells that are kept
+  std::uint32_t left_out = 0;   ///< triangles
   std::uint32_t patched_left_out = 0;  ///< of them those of patched cells
 
   void clear() {
-    vertices.clear();
     cells.clear();
-    triangles = own = left_out = patched_left_out = 0;
+    triangles = left_out = patched_left_out = 0;
   }
 };
 
@@ -127,17 +136,14 @@ using CapFace = std::uint32_t;
 /// What closes the surface of a tile at the border (see cap.h).
 struct TileCap {
   ExistingCells cells;
-  std::uint64_t used[kTileRows];     ///< bit x: a face of this tile has a corner on sample x
-  std::uint32_t first[kTileRows];    ///< which of `vertices` is the row's first
-  PodBuffer<SampleVertex> vertices;  ///< the used ones, by place
+  bool near = false;  ///< whether cells around the tile may lack; else `cells` holds anything
   PodBuffer<CapFace> faces;
-  std::uint32_t own = 0;  ///< of the vertices made by this tile
   std::uint32_t triangles = 0;
 
   void clear() {
-    vertices.clear();
+    near = false;
     faces.clear();
-    own = triangles = 0;
+    triangles = 0;
   }
 };
 
@@ -158,13 +164,14 @@ struct TileState {
   PodBuffer<std::uint32_t>
       edges;  ///< own edges in the order of their vertices: x | y << 6 | z << 12 | axis << 18
   std::uint32_t vertices = 0, triangles = 0;
-  /// Vertices on edges. Inner ones follow, then coincident ones, then those of the cap.
+  /// Vertices on edges. Inner ones follow, then those on samples.
   std::uint32_t edge_vertices = 0;
   std::uint32_t inner_vertices = 0;     ///< of patched cells
   PodBuffer<PatchedCell> patched;       ///< cells that are not in `cells`; of Topology::trilinear
   std::uint32_t patched_triangles = 0;  ///< of `triangles`, the last before the cap's
   std::unique_ptr<CoincidentVertices> coincident;    ///< where degenerate triangles are left out
   std::unique_ptr<TileCap> cap;                      ///< of a capped surface
+  std::unique_ptr<SampleVertices> on_samples;        ///< with either of these
   std::uint64_t vertex_base = 0, triangle_base = 0;  ///< where this tile's output goes
   std::uint32_t number_base = 0;                     ///< what its vertices are numbered from
   TileBoundary* boundary = nullptr;                  ///< of this tile, when later tiles need it

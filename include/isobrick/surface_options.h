@@ -18,8 +18,7 @@ struct SurfaceOptions {
   /// vertices around such a sample become one, the mesh stays welded and closed.
   bool drop_degenerate = false;
   Topology topology = Topology::consistent;  ///< of ambiguous cells
-  /// Closes the surface at the border of the region and around cells that a NaN leaves out. Not
-  /// together with `drop_degenerate`.
+  /// Closes the surface at the border of the region and around cells that a NaN leaves out.
   bool cap = false;
   /// Samples between which cells are looked at.
   Box3 roi = {};

@@ -134,7 +134,6 @@ ExtractRequest check_request(const StoreReader& store, const ExtractOptions& opt
                      .may_have_nan = info.may_have_nan && is_floating(info.type)};
   request.packed = store.is_packed(options.level);
   request.threads = options.threads > 0 ? options.threads : tbb::info::default_concurrency();
-  check_cap(request.surface);
   request.search = resolve_index(store, options.level, options.index);
   if (options.cap) request.search = {};  // an index finds only what the isovalue touches
   request.search_memory = block_search_bytes(store, options.level, request.search, request.threads);

@@ -144,7 +144,6 @@ VolumePass::VolumePass(VolumeSamples& samples, const ExtractOptions& options, In
               .roi = options.roi.value_or(lattice.box()),
               .transform = samples.transform};
   check_roi(surface_.roi, lattice.extent);
-  check_cap(surface_);
 }
 
 /// As if samples were NaN, which is not known before they are scanned.

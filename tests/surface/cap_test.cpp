@@ -424,10 +424,5 @@ TEST(Cap, TakesNoMoreThanItsBounds) {
   count(board, board.box(), true);
 }
 
-TEST(Cap, KeepsDegenerateTriangles) {
-  const Field<float> field({5, 5, 5});
-  EXPECT_THROW(extract(field, {.isovalue = 0, .drop_degenerate = true, .cap = true}), UsageError);
-}
-
 }  // namespace
 }  // namespace isobrick::testing

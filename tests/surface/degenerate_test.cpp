@@ -2,6 +2,7 @@
 #include <tbb/task_arena.h>
 
 #include "surface/coincident_vertices.h"
+#include "surface/sample_vertices.h"
 #include "tests/surface/kept_triangles.h"
 
 // SurfaceOptions::drop_degenerate.
@@ -84,16 +85,17 @@ TEST(DropDegenerateAt, BoundariesAreNoLargerThanTheirBound) {
   TileBoundary boundary;
   TileState tile;
   tile.boundary = &boundary;
-  tile.coincident = std::make_unique<CoincidentVertices>();
-  PodBuffer<SampleVertex>& vertices = tile.coincident->vertices;
+  tile.shape = {.origin = {32, 32, 32}, .lo = {0, 0, 0}, .hi = {32, 32, 32}, .first = {}};
+  tile.on_samples = std::make_unique<SampleVertices>();
+  PodBuffer<SampleVertex>& vertices = tile.on_samples->vertices;
   for_each_point({{0, 0, 0}, {kTileSamples, kTileSamples, kTileSamples}}, [&](Int3 p) {
     vertices.resize(vertices.size() + 1);
     vertices[vertices.size() - 1] = {static_cast<std::uint32_t>(p.x | p.y << 6 | p.z << 12), 0,
-                                     SampleVertex::kOwn};
+                                     SampleVertex::kOwn, true};
   });
-  publish_coincident(tile);
-  EXPECT_EQ(boundary.coincident.size(), 33u * 33 * 33 - 31 * 31 * 31);
-  EXPECT_LE(boundary.coincident.capacity() * sizeof(SharedSample),
+  publish_sample_vertices({.border = {{0, 0, 0}, {128, 128, 128}}}, tile);
+  EXPECT_EQ(boundary.on_samples.size(), 33u * 33 * 33 - 31 * 31 * 31);
+  EXPECT_LE(boundary.on_samples.capacity() * sizeof(SharedSample),
             CpuExtractor::boundary_bytes({1, 1, 1}, true) -
                 CpuExtractor::boundary_bytes({1, 1, 1}, false));
 }

@@ -96,16 +96,21 @@ TEST_F(Cap, MissingSamplesAndConstantBricks) {
     EXPECT_EQ(capped(store, "0.5", {"--topology", topology})["closed"], true);
 }
 
-TEST_F(Cap, RefusesWhatItCannotDo) {
-  const std::string store = store_of("ball", ball);
-  const Arguments words{"extract", store, "--isovalue", "2.5", "--cap", "-o", path("never.ply")};
-  const auto with = [&](const Arguments& more) {
-    Arguments all = words;
-    all.insert(all.end(), more.begin(), more.end());
-    return run(all);
-  };
-  expect_refused(with({"--drop-degenerate"}), 2, {"cap"});
-  const Outcome estimate = with({"--estimate"});
+TEST_F(Cap, WithoutDegenerateTriangles) {
+  // Every sample of the plane equals the isovalue, at the border too.
+  const std::string store = store_of("steps", [](int, int, int z) { return z / 4; });
+  const nlohmann::json kept = capped(store, "3", {"--drop-degenerate"});
+  EXPECT_EQ(kept["closed"], true);
+  EXPECT_EQ(kept["euler_number"], 2);
+  EXPECT_NEAR(kept["volume"].get<double>(), 39.0 * 35 * (32 - 12), 0.01);
+  const std::string mesh = read_file(path("capped.ply"));
+  capped(store, "3", {"--drop-degenerate", "--threads", "1"});
+  EXPECT_TRUE(read_file(path("capped.ply")) == mesh);
+}
+
+TEST_F(Cap, IsEstimated) {
+  const Outcome estimate = run({"extract", store_of("ball", ball), "--isovalue", "2.5", "--cap",
+                                "-o", path("never.ply"), "--estimate"});
   EXPECT_EQ(estimate.exit_code, 0) << estimate.err;
 }
 
