@@ -123,41 +123,18 @@ void list_faces(const KernelContext& context, TileState& tile, int y, int z) {
 
 }  // namespace
 
-CapNormals::CapNormals(const KernelContext& context) {
-  const double sign = context.inside == Inside::below ? -1 : 1;  // the map's normals are reversed
+AxisNormals axis_normals(const WorldMap& world, Inside inside) {
+  const double sign = inside == Inside::below ? -1 : 1;  // the map's normals are reversed
+  AxisNormals normals{};
   for (int a = 0; a < 3; ++a) {
     double n[3], length = 0;
     for (int row = 0; row < 3; ++row) {
-      n[row] = sign * static_cast<double>(context.world.normal[3 * row + a]);
+      n[row] = sign * static_cast<double>(world.normal[3 * row + a]);
       length += n[row] * n[row];
     }
-    for (int row = 0; row < 3; ++row) axis_[a][row] = n[row] / std::sqrt(length);
+    for (int row = 0; row < 3; ++row) normals.axis[a][row] = n[row] / std::sqrt(length);
   }
-}
-
-Vec3f CapNormals::at(const ExistingCells& cells, int x, int y, int z) const {
-  int sum[3] = {0, 0, 0}, any[3] = {0, 0, 0};
-  for (int c = 0; c < 8; ++c) {
-    const int at[3] = {x - 1 + (c & 1), y - 1 + (c >> 1 & 1), z - 1 + (c >> 2)};
-    if (!exists(cells, at[0], at[1], at[2])) continue;
-    for (int axis = 0; axis < 3; ++axis) {
-      const int out = c >> axis & 1 ? -1 : 1;  // to the other cell along the axis at this sample
-      int other[3] = {at[0], at[1], at[2]};
-      other[axis] += out;
-      if (exists(cells, other[0], other[1], other[2])) continue;
-      sum[axis] += out;
-      if (!any[0] && !any[1] && !any[2]) any[axis] = out;
-    }
-  }
-  const int(&n)[3] = sum[0] || sum[1] || sum[2] ? sum : any;
-  double v[3] = {0, 0, 0}, length = 0;
-  for (int row = 0; row < 3; ++row) {
-    for (int axis = 0; axis < 3; ++axis) v[row] += n[axis] * axis_[axis][row];
-    length += v[row] * v[row];
-  }
-  length = std::sqrt(length);
-  return {static_cast<float>(v[0] / length), static_cast<float>(v[1] / length),
-          static_cast<float>(v[2] / length)};
+  return normals;
 }
 
 CapBounds cap_bounds(const SurfaceOptions& options) {

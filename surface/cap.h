@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 
+#include "surface/border_normal.h"
 #include "surface/cap_bounds.h"
 #include "surface/coincident_vertices.h"
 #include "surface/patched_cells.h"
@@ -112,16 +113,7 @@ std::uint32_t polygon_of(const KernelContext& context, const TileState& tile, in
 /// corners on, and completes the counts of triangles.
 void count_cap(ScalarType type, const KernelContext& context, TileState& tile);
 
-/// The normals of a cap's vertices on samples, in world space.
-class CapNormals {
- public:
-  explicit CapNormals(const KernelContext& context);
-  /// The sum of the normals of the border faces around a sample; where they cancel out, that of
-  /// one of them.
-  Vec3f at(const ExistingCells& cells, int x, int y, int z) const;
-
- private:
-  double axis_[3][3];  ///< of faces across each axis, towards larger indices
-};
+/// Of a surface with this map to world space.
+AxisNormals axis_normals(const WorldMap& world, Inside inside);
 
 }  // namespace isobrick

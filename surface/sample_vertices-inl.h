@@ -8,7 +8,6 @@
 #endif
 
 #include <bit>
-#include <optional>
 
 #include "surface/cap.h"
 #include "surface/tile_vertices-inl.h"
@@ -23,15 +22,16 @@ template <class T>
 void write_sample_vertices(const KernelContext& context, const TileState& tile, Vec3f* positions,
                            Vec3f* normals) {
   const ScalarVertices<T> scalar{context, tile};
-  std::optional<CapNormals> of_border;
-  if (normals && tile.cap) of_border.emplace(context);
+  AxisNormals of_border{};
+  if (normals && tile.cap) of_border = axis_normals(context.world, context.inside);
   for (const SampleVertex& vertex : tile.on_samples->vertices) {
     if (vertex.owner != SampleVertex::kOwn) continue;
     scalar.write_sample(vertex.place, positions++, vertex.of_surface ? normals : nullptr);
     if (!normals) continue;
     if (!vertex.of_surface)
-      *normals = of_border->at(tile.cap->cells, vertex.place & 63, vertex.place >> 6 & 63,
-                               vertex.place >> 12 & 63);
+      *normals = border_normal(
+          of_border, vertex.place & 63, vertex.place >> 6 & 63, vertex.place >> 12 & 63,
+          [&](int x, int y, int z) { return exists(tile.cap->cells, x, y, z); });
     ++normals;
   }
 }
