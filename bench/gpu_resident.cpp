@@ -41,7 +41,7 @@ struct Arguments {
   std::vector<Index> dims{512, 512, 512};
   double isovalue = 0;
   bool has_isovalue = false, normals = false, drop_degenerate = false, trilinear = false,
-       brute_force = false, check = false, cpu = false, json = false;
+       cap = false, brute_force = false, check = false, cpu = false, json = false;
   double frequency = 0, noise = 0;
   int runs = 25, threads = 0;
 };
@@ -76,7 +76,12 @@ double run_cpu(const Volume& v, const Lattice& lattice, const DenseBricks& brick
       const auto start = Clock::now();
       tiles.clear();
       extractor.restart();
-      append_active_tiles<T>({{0, 0, 0}, lattice.blocks()}, ranges, options.isovalue, tiles);
+      const Box3 blocks{{0, 0, 0}, lattice.blocks()};
+      if (options.cap)
+        append_capped_tiles<T>(blocks, ranges, options.isovalue, {options.inside, options.roi},
+                               tiles);
+      else
+        append_active_tiles<T>(blocks, ranges, options.isovalue, tiles);
       extractor.extract(tiles, bricks, nullptr);
       times.push_back(std::chrono::duration<double>(Clock::now() - start).count());
     }
@@ -110,6 +115,7 @@ int run(const Arguments& a) {
   options.isovalue = a.has_isovalue ? a.isovalue : default_isovalue(v.type);
   options.normals = a.normals;
   options.drop_degenerate = a.drop_degenerate;
+  options.cap = a.cap;
   if (a.trilinear) options.topology = Topology::trilinear;
   options.roi = lattice.box();
 
@@ -200,6 +206,7 @@ int main(int argc, char** argv) {
   app.add_flag("--normals", a.normals);
   app.add_flag("--drop-degenerate", a.drop_degenerate);
   app.add_flag("--trilinear", a.trilinear);
+  app.add_flag("--cap", a.cap);
   app.add_flag("--brute-force", a.brute_force, "take every tile instead of searching");
   app.add_flag("--check", a.check, "compare with the CPU's mesh");
   app.add_flag("--cpu", a.cpu, "time the CPU as well");

@@ -392,8 +392,7 @@ void add_extract(Program& program) {
               "the trilinear interpolant does, tunnels included",
               "consistent"});
   add_flag(app, "--cap", arguments->cap,
-           "Close the surface at the border of the volume or region and around missing samples (on "
-           "the CPU)");
+           "Close the surface at the border of the volume or region and around missing samples");
   add_filters(app, arguments->filters);
   add_attributes(app, arguments->attributes, arguments->colours);
   add_text(

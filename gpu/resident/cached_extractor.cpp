@@ -22,7 +22,7 @@ int device_of(const void* samples) {
 /// Whether one extractor makes both; they are of one volume.
 bool are_alike(const SurfaceOptions& a, const SurfaceOptions& b) {
   return a.inside == b.inside && a.normals == b.normals && a.drop_degenerate == b.drop_degenerate &&
-         a.topology == b.topology && a.roi == b.roi;
+         a.topology == b.topology && a.cap == b.cap && a.roi == b.roi;
 }
 
 }  // namespace

@@ -14,7 +14,7 @@
 #include "gpu/memory/nvtx_range.h"
 #include "gpu/resident/resident_sizes.h"
 #include "gpu/search/search_kernel.h"
-#include "gpu/tile/supported.h"
+#include "gpu/tile/on_samples.h"
 #include "surface/topology_tables.h"
 #include "surface/world_map.h"
 
@@ -53,7 +53,6 @@ std::shared_ptr<PinnedBuffer<LaunchReport>> take_report() {
 }
 
 SurfaceOptions checked(SurfaceOptions options, const Lattice& lattice) {
-  check_supported(options);
   if (options.indexing != Indexing::welded)
     throw UsageError("a resident volume makes welded meshes only; use the CPU");
   options.roi = intersect(options.roi, lattice.box());
@@ -91,26 +90,27 @@ ResidentLauncher::ResidentLauncher(DeviceVolume::Impl& volume, const SurfaceOpti
   // Tiles that are not searched are never active.
   static_assert(kNone == 0xffffffffu);
   check(cudaMemsetAsync(slot_of_tile_.data(), 0xff, slot_of_tile_.bytes(), stream));
-  if (options_.drop_degenerate) {
-    coincident_shapes_ = launch_shapes(kernel_for(true));
-    const int blocks = coincident_shapes_->shapes[0].blocks;
-    work_ = DeviceBuffer<CoincidentWork>(
-        std::min(volume.tile_count, static_cast<std::uint32_t>(blocks)), volume.stream);
+  int blocks = shapes_.shapes[0].blocks;
+  if (has_samples(options_)) {
+    on_samples_shapes_ = launch_shapes(kernel_for(true));
+    const int on_samples = on_samples_shapes_->shapes[0].blocks;
+    work_ = DeviceBuffer<SampleWork>(
+        std::min(volume.tile_count, static_cast<std::uint32_t>(on_samples)), volume.stream);
+    blocks = std::max(blocks, on_samples);
   }
   if (options_.topology == Topology::trilinear) {
     topology_ = DeviceBuffer<TopologyTables>(1, volume.stream);
     check(cudaMemcpyAsync(topology_.data(), &topology_tables(), topology_.bytes(),
                           cudaMemcpyHostToDevice, stream));
     trilinear_work_ = DeviceBuffer<TrilinearWork>(
-        std::min(volume.tile_count, static_cast<std::uint32_t>(shapes_.shapes[0].blocks)),
-        volume.stream);
+        std::min(volume.tile_count, static_cast<std::uint32_t>(blocks)), volume.stream);
   }
   make_row_tables(std::min(volume.tile_count, kFirstRowTables));
 }
 
-TileKernel ResidentLauncher::kernel_for(bool drop_degenerate) const {
+TileKernel ResidentLauncher::kernel_for(bool on_samples) const {
   TileKernel kernel = kernel_of(volume_.lattice.type, options_);
-  kernel.drop_degenerate = drop_degenerate;
+  kernel.on_samples = on_samples;
   return kernel;
 }
 
@@ -123,7 +123,7 @@ std::size_t ResidentLauncher::search_blocks() const {
   return (volume_.tile_count + kTilesOfSearchBlock - 1) / kTilesOfSearchBlock;
 }
 
-/// Then no tile is active; brute force would take all.
+/// Then no tile is active, but for caps; brute force would take all.
 bool ResidentLauncher::is_above_all_samples(double isovalue) const {
   return visit_scalar(volume_.lattice.type, [&](auto tag) {
     return Threshold<typename decltype(tag)::type>(isovalue).none;
@@ -135,7 +135,7 @@ void ResidentLauncher::make_row_tables(std::uint32_t count) {
   row_tables_ = {};
   row_tables_ = DeviceBuffer<RowTable>(count, volume_.stream);
   check(cudaMemsetAsync(row_tables_.data(), 0, row_tables_.bytes(), volume_.stream.get()));
-  if (options_.drop_degenerate) {
+  if (has_samples(options_)) {
     sample_tables_ = {};
     sample_tables_ = DeviceBuffer<SampleTable>(count, volume_.stream);
   }
@@ -162,6 +162,9 @@ void ResidentLauncher::launch_search(double isovalue) {
   std::memcpy(p.grid, t.tiles, sizeof p.grid);
   set_region(p);
   p.isovalue = isovalue;
+  p.cap = options_.cap;
+  p.below = options_.inside == Inside::below;
+  p.everywhere = options_.may_have_nan;
   p.items = items_.data();
   p.found = &counters()->found;
   p.item_count = &counters()->item_count;
@@ -207,7 +210,12 @@ void ResidentLauncher::launch_tiles(double isovalue, const MeshRoom& room,
   p.vertex_capacity = room.positions.size();
   p.triangle_capacity = room.triangles.size();
   p.end = launch_end();
-  p.coincident = {work_.data(), sample_tables_.data(), nullptr, &counters()->left_out};
+  SurfaceOptions options = options_;
+  options.isovalue = isovalue;
+  p.on_samples = sample_params(volume_.lattice.type, options);
+  p.on_samples.work = work_.data();
+  p.on_samples.tables = sample_tables_.data();
+  p.on_samples.left_out = &counters()->left_out;
   p.trilinear = {trilinear_work_.data(), topology_.data()};
   const LaunchShape shape = shape_for(isovalue, last);
   shape.launch(shape, p, cases_.data(), volume_.stream.get());
@@ -218,15 +226,17 @@ void ResidentLauncher::launch_tiles(double isovalue, const MeshRoom& room,
 LaunchShape ResidentLauncher::shape_for(double isovalue, const DeviceCounts& last) const {
   // A cell has two triangles, give or take.
   const std::uint64_t cells = last.triangles / 2 / std::max(last.active_tiles, 1u);
-  const bool leaves_out = coincident_shapes_ && has_coincident(volume_.lattice.type, isovalue);
-  const LaunchShapes& shapes = leaves_out ? *coincident_shapes_ : shapes_;
+  // Without a cap only isovalues that samples can equal need them.
+  const bool on_samples =
+      options_.cap || (on_samples_shapes_ && has_coincident(volume_.lattice.type, isovalue));
+  const LaunchShapes& shapes = on_samples ? *on_samples_shapes_ : shapes_;
   LaunchShape shape = tuning_.shape ? *tuning_.shape : shapes.of(last.active_tiles, cells);
   shape.blocks = std::min(shape.blocks, static_cast<int>(volume_.tile_count));
   return shape;
 }
 
 bool ResidentLauncher::launch(double isovalue, const MeshRoom& room, const DeviceCounts& last) {
-  if (volume_.tile_count == 0 || is_above_all_samples(isovalue)) return false;
+  if (volume_.tile_count == 0 || (!options_.cap && is_above_all_samples(isovalue))) return false;
   launch_search(isovalue);
   if (volume_.array)
     volume_.array->launch_load(items_.data(), &counters()->found, &counters()->item_count,

@@ -39,7 +39,7 @@ class ResidentLauncher {
   /// Bytes that make_row_tables() takes beyond what is held.
   std::uint64_t bytes_of_row_tables(std::uint32_t count) const {
     return (count - row_tables_.size()) *
-           (sizeof(RowTable) + (options_.drop_degenerate ? sizeof(SampleTable) : 0));
+           (sizeof(RowTable) + (has_samples(options_) ? sizeof(SampleTable) : 0));
   }
 
   /// Whether the last launch wanted more blocks of an array than there is room for, and so made
@@ -67,7 +67,7 @@ class ResidentLauncher {
   void launch_search(double isovalue);
   void launch_tiles(double isovalue, const MeshRoom& room, const DeviceCounts& last);
   LaunchEnd launch_end() const;
-  TileKernel kernel_for(bool drop_degenerate) const;
+  TileKernel kernel_for(bool on_samples) const;
   LaunchShape shape_for(double isovalue, const DeviceCounts& last) const;
   bool read_report(DeviceCounts& counts, std::uint32_t& blocks) const;
 
@@ -75,8 +75,8 @@ class ResidentLauncher {
   SurfaceOptions options_;
   ResidentTuning tuning_;
   LaunchShapes shapes_;
-  /// Where degenerate triangles are left out, for isovalues that samples can equal.
-  std::optional<LaunchShapes> coincident_shapes_;
+  /// Where a mesh may have vertices on samples: of the kernel that makes these.
+  std::optional<LaunchShapes> on_samples_shapes_;
   std::uint32_t launches_ = 0, epoch_ = 0;
   std::uint32_t wanted_blocks_ = 0;  ///< of an array, by the last launch
   DeviceBuffer<CaseTable> cases_;
@@ -86,7 +86,7 @@ class ResidentLauncher {
   DeviceBuffer<std::byte> words_;  ///< Counters, then the sums of the search
   DeviceBuffer<RowTable> row_tables_;
   DeviceBuffer<SampleTable> sample_tables_;
-  DeviceBuffer<CoincidentWork> work_;
+  DeviceBuffer<SampleWork> work_;
   DeviceBuffer<TrilinearWork> trilinear_work_;
   DeviceBuffer<TopologyTables> topology_;
   std::shared_ptr<PinnedBuffer<LaunchReport>> report_;

@@ -20,7 +20,7 @@ constexpr std::uint64_t kSmallObjects = 64 << 10;
 }  // namespace
 
 ResidentSizes resident_sizes(const Lattice& lattice, const ResidentTiles& tiles, bool normals,
-                             bool drop_degenerate, bool trilinear) {
+                             bool on_samples, bool trilinear) {
   const auto grid = static_cast<std::uint64_t>(volume(lattice.tiles()));
   ResidentSizes sizes;
   sizes.volume_bytes =
@@ -31,10 +31,10 @@ ResidentSizes resident_sizes(const Lattice& lattice, const ResidentTiles& tiles,
       std::max(tiles.active, std::min<std::uint64_t>(tiles.searched, kFirstRowTables));
   sizes.extractor_bytes =
       kSmallObjects + grid * sizeof(std::uint32_t) + row_tables * sizeof(RowTable) +
-      (drop_degenerate ? row_tables * sizeof(SampleTable) +
-                             std::min<std::uint64_t>(tiles.searched, kMaxCoincidentBlocks) *
-                                 sizeof(CoincidentWork)
-                       : 0) +
+      (on_samples
+           ? row_tables * sizeof(SampleTable) +
+                 std::min<std::uint64_t>(tiles.searched, kMaxSampleBlocks) * sizeof(SampleWork)
+           : 0) +
       (trilinear
            ? std::min<std::uint64_t>(tiles.searched, kMaxTrilinearBlocks) * sizeof(TrilinearWork) +
                  sizeof(TopologyTables)

@@ -19,7 +19,7 @@ struct ResidentTiles {
 };
 
 ResidentSizes resident_sizes(const Lattice& lattice, const ResidentTiles& tiles, bool normals,
-                             bool drop_degenerate = false, bool trilinear = false);
+                             bool on_samples = false, bool trilinear = false);
 
 /// Row tables from the beginning, 4.4 MiB: with fewer active tiles the first isovalue needs no
 /// second launch.

@@ -17,6 +17,9 @@ struct SearchParams {
   std::uint32_t count;
   std::int32_t grid[3], roi_lo[3], roi_hi[3];  ///< tiles; samples
   double isovalue;
+  /// Of a capped surface (CapSearch): which side is its inside, and whether any tile may lie at the
+  /// border.
+  bool cap, below, everywhere;
   TileItem* items;  ///< room for all
   std::uint32_t* found;
   std::uint32_t* item_count;  ///< the same, but 0 where it is above item_room

@@ -31,17 +31,32 @@ __device__ inline std::size_t place_of(const std::int32_t* t, const std::int32_t
   return (static_cast<std::size_t>(t[2]) * grid[1] + t[1]) * grid[0] + t[0];
 }
 
-template <class T>
-__device__ bool is_stabbed(const SearchParams& p, std::uint32_t i) {
-  if (p.all) return true;
-  const T* range = static_cast<const T*>(p.ranges) + 2 * static_cast<std::size_t>(i);
-  return static_cast<double>(range[0]) < p.isovalue && p.isovalue <= static_cast<double>(range[1]);
+/// Whether a tile has cells at the border of the region of interest.
+__device__ inline bool is_at_border(const SearchParams& p, std::uint32_t i) {
+  bool at_border = false;
+#pragma unroll
+  for (int axis = 0; axis < 3; ++axis) {
+    const int origin = p.tiles[3 * static_cast<std::size_t>(i) + axis] * 32;
+    at_border = at_border || origin <= p.roi_lo[axis] || origin + 32 >= p.roi_hi[axis] - 1;
+  }
+  return at_border;
 }
 
-/// Whether the isovalue stabs the tile's range and the region of interest leaves it a cell.
+/// Whether the isovalue stabs the tile's range, or a cap needs the tile.
+template <class T>
+__device__ bool is_needed(const SearchParams& p, std::uint32_t i) {
+  if (p.all) return true;
+  const T* range = static_cast<const T*>(p.ranges) + 2 * static_cast<std::size_t>(i);
+  const auto lo = static_cast<double>(range[0]), hi = static_cast<double>(range[1]);
+  if (lo < p.isovalue && p.isovalue <= hi) return true;
+  if (!p.cap || !(lo <= hi) || !(p.below ? lo < p.isovalue : hi >= p.isovalue)) return false;
+  return p.everywhere || is_at_border(p, i);
+}
+
+/// Whether a tile is needed and the region of interest leaves it a cell.
 template <class T>
 __device__ bool is_active(const SearchParams& p, std::uint32_t i) {
-  if (!is_stabbed<T>(p, i)) return false;
+  if (!is_needed<T>(p, i)) return false;
   if (p.uncut) return true;
 #pragma unroll
   for (int axis = 0; axis < 3; ++axis) {

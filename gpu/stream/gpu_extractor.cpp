@@ -11,13 +11,12 @@
 #include "gpu/stream/row_slots.h"
 #include "gpu/stream/stream_collector.h"
 #include "gpu/stream/stream_device.h"
-#include "gpu/tile/supported.h"
+#include "gpu/tile/on_samples.h"
 
 namespace isobrick::inline v0::gpu {
 namespace {
 
 SurfaceOptions checked(const Lattice& lattice, SurfaceOptions options) {
-  check_supported(options);
   options = options_that_matter(lattice.type, options);
   if (std::isnan(options.isovalue)) throw UsageError("the isovalue is not a number");
   options.roi = intersect(options.roi, lattice.box());
@@ -88,7 +87,7 @@ struct GpuExtractor::Impl {
     auto* links = reinterpret_cast<TileLinks*>(launch.at(device.layout().links));
     auto* neighbours = reinterpret_cast<TileNeighbours*>(launch.at(device.layout().neighbours));
     for (std::uint32_t i = 0; i < tiles.size(); ++i) {
-      if (options.drop_degenerate) slots.find_around(tiles[i].tile, neighbours[i]);
+      if (has_samples(options)) slots.find_around(tiles[i].tile, neighbours[i]);
       items[i] = link(tiles[i], i, links[i]);
     }
     if (welded()) slots.end_launch(tiles.back().tile, launch.unused_slots);

@@ -18,8 +18,8 @@ class GpuExtractor final : public SurfaceExtractor {
  public:
   /// Buffers of the given sizes on the device, which open_device has made ready; of smaller
   /// launches where the device has no room for them. The sink must outlive it. Throws UsageError
-  /// for what has no kernels (supported.h), an isovalue that is not a number or an empty region,
-  /// Error where a single tile does not fit. Sizes with a pool of bricks are for that pool.
+  /// for an isovalue that is not a number or an empty region, Error where a single tile does not
+  /// fit. Sizes with a pool of bricks are for that pool.
   GpuExtractor(int device, const Lattice& lattice, const SurfaceOptions& options,
                const StreamSizes& sizes, MeshSink& sink,
                const std::shared_ptr<BrickPool>& pool = nullptr);

@@ -53,7 +53,7 @@ bool StreamDevice::allocate(const StreamSizes& sizes) {
   }
   Arena arena(memory_.data(), memory_.size());
   sizes_ = sizes;
-  layout_ = StagingLayout(sizes.tiles, sizes.tile_bricks, options_.drop_degenerate);
+  layout_ = StagingLayout(sizes.tiles, sizes.tile_bricks, has_samples(options_));
   in_flight_.clear();
   const auto in_flight = static_cast<std::size_t>(sizes.in_flight);
   staging_ = PinnedBuffer<std::byte>(in_flight * sizes.staging_bytes);
@@ -71,9 +71,10 @@ bool StreamDevice::allocate(const StreamSizes& sizes) {
   cases_ = arena.take<CaseTable>(1);
   number_ends_ = arena.take<unsigned long long>(kEnds + 1);
   params_.row_tables = arena.take<RowTable>(sizes.slots);
-  if (options_.drop_degenerate) {
-    params_.coincident.tables = arena.take<SampleTable>(sizes.slots);
-    params_.coincident.work = arena.take<CoincidentWork>(sizes.coincident_blocks);
+  params_.on_samples = sample_params(lattice_.type, options_);
+  if (has_samples(options_)) {
+    params_.on_samples.tables = arena.take<SampleTable>(sizes.slots);
+    params_.on_samples.work = arena.take<SampleWork>(sizes.sample_blocks);
   }
   if (options_.topology == Topology::trilinear) {
     auto* tables = arena.take<TopologyTables>(1);
@@ -110,9 +111,9 @@ void StreamDevice::launch_kernels(InFlightLaunch& launch, std::uint32_t first, s
   TileParams p = params_;
   p.items = reinterpret_cast<const TileItem*>(launch.device + layout_.items) + first;
   p.links = reinterpret_cast<const TileLinks*>(launch.device + layout_.links) + first;
-  p.coincident.neighbours =
+  p.on_samples.neighbours =
       reinterpret_cast<const TileNeighbours*>(launch.device + layout_.neighbours) + first;
-  p.coincident.left_out = &header->totals.left_out;
+  p.on_samples.left_out = &header->totals.left_out;
   p.order = reinterpret_cast<OrderState*>(launch.device + layout_.order);
   p.item_count = &header->item_count;
   p.ticket = &header->ticket;
@@ -134,7 +135,7 @@ void StreamDevice::launch_kernels(InFlightLaunch& launch, std::uint32_t first, s
              std::size_t{first} * sizes_.tile_bricks;
   u.tile_bricks = sizes_.tile_bricks;
   u.reach = static_cast<int>(sample_reach(options_));
-  u.corners = options_.may_have_nan || options_.drop_degenerate;
+  u.corners = options_.may_have_nan || has_samples(options_);
   for (int axis = 0; axis < 3; ++axis) {
     u.brick[axis] = static_cast<std::int32_t>(lattice_.brick[axis]);
     u.extent[axis] = p.extent[axis];

@@ -7,7 +7,7 @@
 #include "gpu/tile/tile_params.h"
 
 // What the host sends for a launch, in one copy: the header, the items, their links and, where
-// degenerate triangles are left out, neighbours, their zeroed running totals, where the bricks of
+// a mesh has vertices on samples, neighbours, their zeroed running totals, where the bricks of
 // each lie. Bricks that are sent follow.
 
 namespace isobrick::inline v0::gpu {
@@ -30,11 +30,11 @@ struct StagingLayout {
   std::size_t items, links, neighbours, order, boxes, bricks, end;
 
   /// A tile has at most `tile_bricks` bricks.
-  constexpr StagingLayout(std::size_t tiles, std::size_t tile_bricks, bool drop_degenerate)
+  constexpr StagingLayout(std::size_t tiles, std::size_t tile_bricks, bool on_samples)
       : items(Arena::aligned(sizeof(LaunchHeader))),
         links(items + Arena::aligned(tiles * sizeof(TileItem))),
         neighbours(links + Arena::aligned(tiles * sizeof(TileLinks))),
-        order(neighbours + Arena::aligned(drop_degenerate ? tiles * sizeof(TileNeighbours) : 0)),
+        order(neighbours + Arena::aligned(on_samples ? tiles * sizeof(TileNeighbours) : 0)),
         boxes(order + Arena::aligned(tiles * sizeof(OrderState))),
         bricks(boxes + Arena::aligned(tiles * sizeof(BrickBox))),
         end(bricks + Arena::aligned(tiles * tile_bricks * sizeof(std::uint64_t))) {}

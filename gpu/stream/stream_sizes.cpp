@@ -10,7 +10,8 @@
 #include "gpu/stream/brick_pool.h"
 #include "gpu/stream/stream_layout.h"
 #include "gpu/tile/block_groups.h"
-#include "gpu/tile/supported.h"
+#include "gpu/tile/on_samples.h"
+#include "surface/cap_bounds.h"
 #include "surface/cpu_extractor.h"
 #include "surface/surface_extractor.h"
 
@@ -19,11 +20,12 @@ namespace {
 
 /// Mesh to expect of a tile before anything is known; launches shrink where there is more.
 constexpr std::uint64_t kVerticesOfTile = 1600, kTrianglesOfTile = 3200;
-/// What a tile can make at most: 3 edges a sample, and what the topology has in a cell.
-MeshSize max_tile_mesh(Topology topology) {
-  const MeshSize of_cell = CpuExtractor::max_in_cell(topology);
-  return {std::uint64_t{3} * 33 * 33 * 33 + of_cell.vertices * kTileBlockSamples,
-          of_cell.triangles * kTileBlockSamples};
+/// What a tile can make at most: 3 edges a sample, what the topology has in a cell, and the cap.
+MeshSize max_tile_mesh(const SurfaceOptions& options) {
+  const MeshSize of_cell = CpuExtractor::max_in_cell(options.topology);
+  const CapBounds cap = cap_bounds(options);
+  return {std::uint64_t{3} * 33 * 33 * 33 + of_cell.vertices * kTileBlockSamples + cap.vertices,
+          of_cell.triangles * kTileBlockSamples + cap.faces * kMaxFaceTriangles};
 }
 /// Case table, ends of the numbering, and the rounding of buffers.
 constexpr std::uint64_t kSmallBuffers = 64 << 10;
@@ -87,16 +89,16 @@ StreamSizes stream_sizes(const Lattice& lattice, const SurfaceOptions& given, st
   const auto in_flight_count = static_cast<std::uint64_t>(in_flight);
   s.tiles = tiles;
   s.in_flight = in_flight;
-  const MeshSize most = max_tile_mesh(options.topology);
+  const MeshSize most = max_tile_mesh(options);
   s.vertices = std::max(most.vertices, tiles * kVerticesOfTile);
   s.triangles = std::max(most.triangles, tiles * kTrianglesOfTile);
   s.slots = static_cast<std::uint32_t>(
       slots_for(lattice, options.indexing == Indexing::welded, tiles, in_flight));
   s.tile_bricks = static_cast<std::uint32_t>(max_bricks_of_tile(lattice, sample_reach(options)));
   if (pool.bricks == 0) s.sent_bricks = static_cast<std::uint32_t>(bricks_to_send(lattice, tiles));
-  const bool leaves_out = options.drop_degenerate;
-  s.staging_bytes = StagingLayout(tiles, s.tile_bricks, leaves_out).end;
-  if (leaves_out) s.coincident_blocks = std::min<std::uint32_t>(tiles, kMaxCoincidentBlocks);
+  const bool on_samples = has_samples(options);
+  s.staging_bytes = StagingLayout(tiles, s.tile_bricks, on_samples).end;
+  if (on_samples) s.sample_blocks = std::min<std::uint32_t>(tiles, kMaxSampleBlocks);
   const bool trilinear = options.topology == Topology::trilinear;
   if (trilinear) s.trilinear_blocks = std::min<std::uint32_t>(tiles, kMaxTrilinearBlocks);
   s.output_bytes = MeshArrays::bytes(s.vertices, s.triangles, options.normals);
@@ -104,8 +106,8 @@ StreamSizes stream_sizes(const Lattice& lattice, const SurfaceOptions& given, st
   s.tile_block_bytes = groups * kBlockGroupSamples * lattice.sample_bytes();
   s.device_bytes =
       kSmallBuffers + std::uint64_t{s.slots} * sizeof(RowTable) +
-      (leaves_out ? std::uint64_t{s.slots} * sizeof(SampleTable) : 0) +
-      s.coincident_blocks * sizeof(CoincidentWork) + s.trilinear_blocks * sizeof(TrilinearWork) +
+      (on_samples ? std::uint64_t{s.slots} * sizeof(SampleTable) : 0) +
+      s.sample_blocks * sizeof(SampleWork) + s.trilinear_blocks * sizeof(TrilinearWork) +
       (trilinear ? sizeof(TopologyTables) : 0) + s.tile_block_bytes +
       pool_device_bytes(lattice, pool) +
       in_flight_count * (s.staging_bytes + s.sent_bricks * lattice.brick_bytes() + s.output_bytes);

@@ -28,7 +28,7 @@ struct StreamSizes {
   int in_flight = 0;                          ///< launches at a time
   std::uint64_t vertices = 0, triangles = 0;  ///< that the output of a launch has room for
   std::uint32_t slots = 0;                    ///< row tables
-  std::uint32_t coincident_blocks = 0;        ///< of threads, where degenerate triangles go
+  std::uint32_t sample_blocks = 0;            ///< of threads that make vertices on samples
   std::uint32_t trilinear_blocks = 0;         ///< of threads, that follow the interpolant
   std::uint32_t tile_bricks = 0;              ///< bricks that a tile's samples can lie in
   std::uint32_t sent_bricks = 0;              ///< that a launch can take along whole

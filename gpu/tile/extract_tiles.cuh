@@ -36,25 +36,24 @@ __device__ void end_launch(TileShared& s, const TileParams& p) {
     report(p, LaunchReport::kActiveTiles, *end.found);
     report(p, LaunchReport::kBlocks, end.blocks ? *end.blocks : 0);
     report(p, LaunchReport::kLeftOut,
-           Extra == TileExtra::coincident
-               ? DeviceWord(*p.coincident.left_out).load(cuda::memory_order_relaxed)
-               : 0);
+           has_samples(Extra) ? DeviceWord(*p.on_samples.left_out).load(cuda::memory_order_relaxed)
+                              : 0);
     if (s.items == 0) {
       report(p, LaunchReport::kVertices, 0);
       report(p, LaunchReport::kTriangles, 0);
     }
   }
-  if constexpr (Extra == TileExtra::coincident) __syncthreads();  // what is zeroed has been read
+  if constexpr (has_samples(Extra)) __syncthreads();  // what is zeroed has been read
   for (std::uint32_t i = own_thread(); i < end.zero_words; i += N)
     DeviceFlag(end.zero[i]).store(0, cuda::memory_order_relaxed);  // others have added to them
 }
 
-/// Kernels that leave degenerate triangles out treat NaN, too: both need the samples around.
+/// Kernels that make vertices on samples treat NaN, too: both need the samples around.
 template <int N, class T, bool Normals, bool Nan, TileExtra Extra = TileExtra::none>
 __global__ void __launch_bounds__(N, BlockConfig<N>::kBlocks)
     extract_tiles(const __grid_constant__ TileParams p, const T threshold,
                   const CaseTable* __restrict__ cases) {
-  static_assert(Nan || Extra != TileExtra::coincident);
+  static_assert(Nan || !has_samples(Extra));
   extern __shared__ __align__(256) unsigned char shared_bytes[];
   TileShared& s = *reinterpret_cast<TileShared*>(shared_bytes);
   fill_tables<N>(s, cases);
@@ -68,9 +67,10 @@ __global__ void __launch_bounds__(N, BlockConfig<N>::kBlocks)
   take_tile<T>(s, p, next_number(p));
   __syncthreads();
   while (s.item < s.items) {
-    classify_tile<N, T, Nan>(s, p, classifier);
-    if constexpr (Extra == TileExtra::coincident) find_coincident<N>(s, p, threshold);
-    if constexpr (Extra == TileExtra::trilinear) find_patched<N, T, Nan>(s, p);
+    classify_tile<N, T, Nan, Extra>(s, p, classifier);
+    if constexpr (has_samples(Extra)) find_samples<N>(s, p, threshold);
+    if constexpr (is_trilinear(Extra)) find_patched<N, T, Nan, has_samples(Extra)>(s, p);
+    if constexpr (has_samples(Extra)) find_on_samples<N, T, is_trilinear(Extra)>(s, p);
     if (count_tile<N, Nan, Extra>(s, p)) {
       place_tile<N, Nan, Extra>(s, p);
       write_tile<N, T, Normals, Nan, Extra>(s, p, threshold);

@@ -23,9 +23,10 @@ LaunchShape nan_shape(bool normals) {
 
 LaunchShapes launch_shapes(const TileKernel& kernel) {
   LaunchShapes shapes;
-  if (kernel.drop_degenerate)
+  if (kernel.on_samples)
     shapes.shapes[0] = shapes.shapes[1] = shapes.shapes[2] =
-        coincident_shape(kernel.type, kernel.normals);
+        kernel.trilinear ? trilinear_on_samples_shape(kernel.type, kernel.normals)
+                         : on_samples_shape(kernel.type, kernel.normals);
   else if (kernel.trilinear)
     shapes.shapes[0] = shapes.shapes[1] = shapes.shapes[2] =
         trilinear_shape(kernel.type, kernel.normals, kernel.may_have_nan);

@@ -4,7 +4,7 @@
 
 #include <isobrick/scalar.h>
 #include <isobrick/surface_options.h>
-#include "gpu/tile/supported.h"
+#include "gpu/tile/on_samples.h"
 #include "gpu/tile/tile_params.h"
 
 namespace isobrick::inline v0::gpu {
@@ -14,12 +14,12 @@ struct TileKernel {
   ScalarType type;
   bool normals = false;
   bool may_have_nan = false;  ///< of f32 and f64 only
-  bool drop_degenerate = false;
+  bool on_samples = false;    ///< makes vertices on samples
   bool trilinear = false;
 };
 inline TileKernel kernel_of(ScalarType type, const SurfaceOptions& given) {
   const SurfaceOptions options = options_that_matter(type, given);
-  return {type, options.normals, options.may_have_nan, options.drop_degenerate,
+  return {type, options.normals, options.may_have_nan, has_samples(options),
           options.topology == Topology::trilinear};
 }
 
@@ -44,11 +44,14 @@ struct LaunchShapes {
   const LaunchShape& of(std::uint32_t tiles, std::uint64_t cells = 0) const;
 };
 
-/// Of a kernel that leaves degenerate triangles out.
-LaunchShape coincident_shape(ScalarType type, bool normals);
+/// Of a kernel that makes vertices on samples.
+LaunchShape on_samples_shape(ScalarType type, bool normals);
 
 /// Of a kernel that follows the trilinear interpolant.
 LaunchShape trilinear_shape(ScalarType type, bool normals, bool may_have_nan);
+
+/// Of a kernel that does both.
+LaunchShape trilinear_on_samples_shape(ScalarType type, bool normals);
 
 /// Throws Error where no kernel fits the device.
 LaunchShapes launch_shapes(const TileKernel& kernel);

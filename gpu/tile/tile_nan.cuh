@@ -62,6 +62,23 @@ __device__ inline void for_each_row_around(const TileShared& s, const TileParams
   }
 }
 
+/// What lies outside of the region of interest, where no sample is NaN.
+template <int N>
+__device__ inline void find_outside(TileShared& s, const TileParams& p) {
+  NanRows& nan = nan_rows_of(s);
+  // The samples from −1 to 33 that exist along an axis, as bits from 0 on.
+  const auto exist = [&](int axis) {
+    const int lo = ::max(p.roi_lo[axis] - s.shape.origin[axis], -1),
+              hi = ::min(p.roi_hi[axis] - s.shape.origin[axis], 34);
+    return hi <= lo ? 0ull : bit_span(lo + 1, hi);
+  };
+  const unsigned long long x = exist(0), y = exist(1), z = exist(2);
+  for (unsigned row = own_thread(); row < kRowsAround; row += N) {
+    const bool here = (y >> row % kEdgeAround & z >> row / kEdgeAround & 1u) != 0;
+    nan.rows[row] = (here ? ~x : ~0ull) & ((1ull << kEdgeAround) - 1);
+  }
+}
+
 /// Beside classify_samples().
 template <int N, class T>
 __device__ inline void find_nan(TileShared& s, const TileParams& p) {

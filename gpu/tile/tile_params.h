@@ -3,7 +3,7 @@
 #include <cstdint>
 
 #include <isobrick/mesh.h>
-#include "gpu/tile/coincident_params.h"
+#include "gpu/tile/on_samples_params.h"
 #include "gpu/tile/trilinear_params.h"
 #include "surface/cell_math.h"
 
@@ -105,12 +105,19 @@ struct alignas(16) CaseTable {
 /// For right-handed axes, or mirrored ones.
 CaseTable make_case_table(bool mirrored);
 
-/// What a kernel does beside the tables of cases.
+/// What a kernel does beside the tables of cases, as bits.
 enum class TileExtra : std::uint8_t {
-  none,
-  coincident,  ///< leaves degenerate triangles out
-  trilinear,   ///< follows the trilinear interpolant
+  none = 0,
+  trilinear = 1,   ///< follows the trilinear interpolant
+  on_samples = 2,  ///< makes vertices on samples: leaves degenerate triangles out, or makes a cap
+  both = 3,
 };
+constexpr bool is_trilinear(TileExtra extra) {
+  return (static_cast<int>(extra) & static_cast<int>(TileExtra::trilinear)) != 0;
+}
+constexpr bool has_samples(TileExtra extra) {
+  return (static_cast<int>(extra) & static_cast<int>(TileExtra::on_samples)) != 0;
+}
 
 struct TileParams {
   const TileItem* items;  ///< the active tiles in Morton order
@@ -141,9 +148,9 @@ struct TileParams {
   Vec3f* normals;
   Triangle* triangles;
   std::uint64_t vertex_capacity, triangle_capacity;
-  SurfaceTotals* totals;        ///< where there is no report
-  CoincidentParams coincident;  ///< of the kernels that leave degenerate triangles out
-  TrilinearParams trilinear;    ///< of those that follow the trilinear interpolant
+  SurfaceTotals* totals;      ///< where there is no report
+  SampleParams on_samples;    ///< of the kernels that make vertices on samples
+  TrilinearParams trilinear;  ///< of those that follow the trilinear interpolant
   LaunchEnd end;
 };
 

@@ -1,13 +1,13 @@
 #pragma once
 
-#include "gpu/tile/coincident_mesh.cuh"
+#include "gpu/tile/on_samples_mesh.cuh"
 #include "gpu/tile/tile_barrier.cuh"
 #include "gpu/tile/tile_boundary.cuh"
 #include "gpu/tile/tile_count.cuh"
 #include "gpu/tile/tile_nan.cuh"
 #include "gpu/tile/tile_triangles.cuh"
-#include "gpu/tile/tile_trilinear.cuh"
 #include "gpu/tile/tile_vertices.cuh"
+#include "gpu/tile/trilinear_mesh.cuh"
 
 // The steps from the samples of a tile to its mesh, and where its warps wait for each other.
 
@@ -42,13 +42,19 @@ __device__ inline void init_barriers(WarpBarriers& barriers) {
 
 /// The inside bits of a tile's samples, and in volumes that may hold NaN the samples that are none.
 /// Other tiles need the room of those for their lists, which are emptied beside it.
-template <int N, class T, bool Nan>
+template <int N, class T, bool Nan, TileExtra Extra>
 __device__ inline void classify_tile(TileShared& s, const TileParams& p,
                                      const Classifier<T>& classifier) {
-  if constexpr (Nan)
+  if constexpr (Nan && has_samples(Extra)) {
+    if (p.on_samples.may_have_nan)
+      find_nan<N, T>(s, p);
+    else
+      find_outside<N>(s, p);
+  } else if constexpr (Nan) {
     find_nan<N, T>(s, p);
-  else
+  } else {
     clear_lists<N>(s, s.all_cells, s.all_vertices);
+  }
   classify_samples<N>(s, p, classifier);
   __syncthreads();
 }
@@ -59,17 +65,16 @@ template <int N, bool Nan, TileExtra Extra>
 __device__ inline bool count_tile(TileShared& s, const TileParams& p) {
   count_rows<N>(s, [&](int y, int z, RowEdges& edges) {
     if constexpr (Nan) leave_out_nan(nan_rows_of(s), y, z, edges);
-    if constexpr (Extra == TileExtra::coincident)
-      leave_out_coincident(coincident_work(p), y, z, edges);
-    if constexpr (Extra == TileExtra::trilinear)
-      edges.cells &= ~trilinear_work(p).cells[33 * z + y];
+    if constexpr (has_samples(Extra))
+      if (sample_work(p).any_at) leave_out_coincident(sample_work(p), y, z, edges);
+    if constexpr (is_trilinear(Extra)) edges.cells &= ~trilinear_work(p).cells[33 * z + y];
   });
   __syncthreads();
   if constexpr (Nan) clear_lists<N>(s, ListsOf<N>::kListed, ListsOf<N>::kListed);
   const PlaneBases bases = PlaneBases::of(s);
   const std::uint32_t vertices = bases.all_vertices(s);
   std::uint32_t beside = 0;  // triangles of cells that are in no list
-  if constexpr (Extra == TileExtra::trilinear) beside = trilinear_work(p).own_triangles;
+  if constexpr (is_trilinear(Extra)) beside = trilinear_work(p).own_triangles;
   if (!Nan && vertices + bases.cells + beside == 0 && s.item + 1 < s.items) {
     pass_empty_tile(s, p);
     __syncthreads();
@@ -80,8 +85,8 @@ __device__ inline bool count_tile(TileShared& s, const TileParams& p) {
     s.all_vertices = vertices;
     s.all_cells = bases.cells;
     s.extra_vertices = 0;
-    if constexpr (Extra == TileExtra::coincident) s.extra_vertices = coincident_work(p).own;
-    if constexpr (Extra == TileExtra::trilinear) s.extra_vertices = trilinear_work(p).own_vertices;
+    if constexpr (has_samples(Extra)) s.extra_vertices += sample_work(p).own;
+    if constexpr (is_trilinear(Extra)) s.extra_vertices += trilinear_work(p).own_vertices;
     if (listed_at_once<N, Nan>(s)) s.barriers.turn ^= 1;
     publish_sum(p.order[s.item].vertices, s.item, s.all_vertices + s.extra_vertices);
   }
@@ -138,8 +143,8 @@ __device__ inline void place_tile(TileShared& s, const TileParams& p) {
   if (at_once && (for_vertices || for_triangles)) wait(s.barriers.cells, turn);
   if (for_triangles) {
     if (at_once) triangles = triangles_before<N>(s, (cells + 31) / 32);
-    if constexpr (Extra == TileExtra::coincident) triangles += coincident_work(p).kept;
-    if constexpr (Extra == TileExtra::trilinear) triangles += trilinear_work(p).own_triangles;
+    if constexpr (has_samples(Extra)) triangles += sample_work(p).kept + sample_work(p).capped;
+    if constexpr (is_trilinear(Extra)) triangles += trilinear_work(p).own_triangles;
     if (lane_id() == 0) {
       s.all_triangles = triangles;
       publish_sum(p.order[s.item].triangles, s.item, triangles);
@@ -148,7 +153,7 @@ __device__ inline void place_tile(TileShared& s, const TileParams& p) {
   }
   if (for_vertices) {
     fetch_boundaries<N>(s, p, neighbour);
-    if constexpr (Extra == TileExtra::coincident) fetch_owners(s, p);
+    if constexpr (has_samples(Extra)) fetch_owners(s, p);
     if (at_once) arrive(s.barriers.neighbours);
   } else if (at_once) {
     wait(s.barriers.vertex_base, turn);
@@ -197,6 +202,25 @@ __device__ inline bool can_help(TileShared& s) {
          uniform(taken) + BlockConfig<N>::kWarps <= (s.all_vertices + 31) / 32;
 }
 
+/// What the tables of cases don't have: the triangles behind the others, in the order of the CPU.
+template <int N, class T, bool Normals, TileExtra Extra>
+__device__ inline void write_extra(const TileShared& s, const TileParams& p, T threshold) {
+  std::uint32_t capped = 0, patched = 0;
+  if constexpr (has_samples(Extra)) capped = sample_work(p).capped;
+  if constexpr (is_trilinear(Extra)) {
+    patched = trilinear_work(p).own_triangles;
+    write_inner_vertices<N, T, Normals>(s, p);
+    write_patched_triangles<N, has_samples(Extra)>(s, p, capped);
+  }
+  if constexpr (has_samples(Extra)) {
+    write_sample_vertices<N, T, Normals, is_trilinear(Extra)>(s, p, threshold);
+    write_kept_triangles<N>(s, p, patched + capped);
+    write_cap_triangles<N, T, is_trilinear(Extra)>(s, p);
+  }
+  // The first warp takes the next tile, and others still asked for this one.
+  if constexpr (Extra != TileExtra::none) __syncthreads();
+}
+
 /// Writes the mesh of a tile that has its place.
 template <int N, class T, bool Normals, bool Nan, TileExtra Extra>
 __device__ inline void write_tile(TileShared& s, const TileParams& p, T threshold) {
@@ -218,8 +242,7 @@ __device__ inline void write_tile(TileShared& s, const TileParams& p, T threshol
   number_edges<N>(s);
   __syncthreads();
   write_triangles<N>(s, p);
-  if constexpr (Extra == TileExtra::coincident) write_coincident<N, T, Normals>(s, p, threshold);
-  if constexpr (Extra == TileExtra::trilinear) write_patched<N, T, Normals>(s, p);
+  write_extra<N, T, Normals, Extra>(s, p, threshold);
 }
 
 }  // namespace isobrick::gpu

@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "gpu/tile/coincident_params.h"
+#include "gpu/tile/on_samples_params.h"
 #include "surface/cell_topology.h"
 
 // What the extraction kernel needs to follow the trilinear interpolant (surface/patched_cells.h).

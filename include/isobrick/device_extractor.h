@@ -42,8 +42,8 @@ class ISOBRICK_API PendingDeviceMesh {
 /// Of a store: the constructor reads a level, or a region of it, to the device, which decodes
 /// packed bricks itself. Each isovalue then reads the blocks that it touches.
 ///
-/// Of the ExtractOptions of a surface, `isovalue`, `roi`, `inside`, `normals`, `drop_degenerate`
-/// and `gpu_memory` matter; `inside` is above by default, but for a store's level set; `gpu_memory`
+/// Of the ExtractOptions of a surface, `isovalue`, `roi`, `inside`, `normals`, `drop_degenerate`,
+/// `topology`, `cap` and `gpu_memory` matter; `inside` is above by default, but for a store's level set; `gpu_memory`
 /// is without bound. The calling thread's current device is afterwards what it was before.
 class ISOBRICK_API DeviceExtractor {
  public:
@@ -67,9 +67,8 @@ class ISOBRICK_API DeviceExtractor {
   DeviceExtractor(DeviceExtractor&&) noexcept;
 
   /// Waits until the size of the mesh is known, not until it is written. Throws UsageError for
-  /// another level or region than was read, for `cap`, Topology::trilinear with `drop_degenerate`,
-  /// an isovalue that is not a number, a region without samples and for `gpu_memory` that is too
-  /// small; gpu::OutOfDeviceMemory.
+  /// another level or region than was read, an isovalue that is not a number, a region without
+  /// samples and for `gpu_memory` that is too small; gpu::OutOfDeviceMemory.
   DeviceMesh extract(const ExtractOptions& options);
   /// Waits for nothing. The memory for the mesh is what the last one needed, some for the first.
   PendingDeviceMesh extract_async(const ExtractOptions& options);

@@ -85,8 +85,7 @@ struct DeviceCounts {
 class ISOBRICK_API ResidentExtractor {
  public:
   /// The isovalue of `options` does not matter. Takes at most `max_bytes` of device memory besides
-  /// the volume's. Throws UsageError for what the device cannot do yet: caps, Topology::trilinear
-  /// without degenerate triangles, meshes that are not welded; OutOfDeviceMemory.
+  /// the volume's. Throws UsageError for meshes that are not welded; OutOfDeviceMemory.
   ResidentExtractor(DeviceVolume& volume, const SurfaceOptions& options,
                     const ResidentTuning& tuning = {}, std::uint64_t max_bytes = ~std::uint64_t{0});
   ~ResidentExtractor();

@@ -36,7 +36,7 @@ struct ExtractOptions {
   bool normals = false;               ///< gradient normals
   bool drop_degenerate = false;       ///< see SurfaceOptions
   Topology topology = Topology::consistent;       ///< how ambiguous cells are resolved
-  bool cap = false;                               ///< see SurfaceOptions; on the CPU
+  bool cap = false;                               ///< see SurfaceOptions
   std::uint64_t memory = std::uint64_t{1} << 30;  ///< hard budget, bytes
   /// Of the budget of the whole command what others take; messages name both together.
   std::uint64_t memory_of_others = 0;

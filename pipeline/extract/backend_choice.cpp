@@ -5,7 +5,6 @@
 #include <algorithm>
 
 #include <isobrick/error.h>
-#include "gpu/tile/supported.h"
 
 namespace isobrick::inline v0 {
 namespace {
@@ -37,11 +36,9 @@ bool use_cuda(const ExtractRequest& request, const ExtractOptions& options,
   if (options.backend == Backend::cpu) return false;
   if (request.part) active_blocks = request.part->active_blocks;
   const bool must = options.backend == Backend::cuda;
-  const auto why = gpu::why_unsupported(request.surface);
-  if (must && why) throw UsageError("--backend cuda: " + *why);
   if (must && !built_with_cuda())
     throw Error("--backend cuda: this isobrick was built without CUDA; use --backend cpu");
-  const bool wanted = must || (!why && is_worth_it(request, active_blocks));
+  const bool wanted = must || is_worth_it(request, active_blocks);
   if (!wanted && options.device == 0) return false;
   const int devices = cuda_device_count();
   if (must && devices == 0)

@@ -40,7 +40,7 @@ class ResidentPass {
     if (!tiles) return false;
     report_search(stream, surfaces_.reports);
     const gpu::ResidentSizes sizes =
-        gpu::resident_sizes(lattice(), tiles->count(), any_normals(), any_drop_degenerate(),
+        gpu::resident_sizes(lattice(), tiles->count(), any_normals(), any_on_samples(),
                             common().surface.topology == Topology::trilinear);
     const std::uint64_t beside = std::max(sizes.extractor_bytes, loader_.device_bytes());
     if (sizes.volume_bytes + beside + kPieceOfDriver > budget_) return false;
@@ -86,9 +86,10 @@ class ResidentPass {
     return std::any_of(surfaces_.requests.begin(), surfaces_.requests.end(),
                        [](const ExtractRequest& r) { return r.surface.normals; });
   }
-  bool any_drop_degenerate() const {
-    return std::any_of(surfaces_.requests.begin(), surfaces_.requests.end(),
-                       [](const ExtractRequest& r) { return r.surface.drop_degenerate; });
+  bool any_on_samples() const {
+    return std::any_of(
+        surfaces_.requests.begin(), surfaces_.requests.end(),
+        [](const ExtractRequest& r) { return r.surface.drop_degenerate || r.surface.cap; });
   }
 
   std::uint64_t bytes_of(const ExtractRequest& request) const {

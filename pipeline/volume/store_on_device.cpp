@@ -15,7 +15,6 @@
 #include "core/cancellable_progress.h"
 #include "core/morton.h"
 #include "gpu/memory/device_scope.h"
-#include "gpu/tile/supported.h"
 #include "pipeline/extract/backend_choice.h"
 #include "pipeline/extract/device_loader.h"
 #include "pipeline/program_memory.h"
@@ -88,9 +87,7 @@ class StoreLoad {
     const int devices = cuda_device_count();
     if (devices == 0) throw Error("there is no CUDA device here");
     check_cuda_device(options.device, devices);
-    ExtractRequest request = check_request(store, options, Indexing::welded);
-    gpu::check_supported(request.surface);
-    return request;
+    return check_request(store, options, Indexing::welded);
   }
 
   const Lattice& lattice() const { return request_.level->lattice; }

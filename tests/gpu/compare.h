@@ -22,11 +22,22 @@ std::vector<TileWork> active_tiles(const Field<T>& field, double isovalue) {
   return tiles;
 }
 
+/// The tiles that a surface needs, those of its cap included.
+template <class T>
+std::vector<TileWork> tiles_of(const Field<T>& field, const SurfaceOptions& options) {
+  if (!options.cap) return active_tiles(field, options.isovalue);
+  std::vector<TileWork> tiles;
+  const Lattice lattice{field.extent, {64, 64, 64}, scalar_type_of<T>};
+  append_capped_tiles<T>({{0, 0, 0}, lattice.blocks()}, block_ranges(field), options.isovalue,
+                         {options.inside, options.roi, options.may_have_nan}, tiles);
+  return tiles;
+}
+
 /// The mesh that those from a device are compared with.
 template <class T>
 isobrick::Mesh on_cpu(const Field<T>& field, const Lattice& lattice, const BrickLookup& bricks,
                       const SurfaceOptions& options) {
-  const std::vector<TileWork> tiles = active_tiles(field, options.isovalue);
+  const std::vector<TileWork> tiles = tiles_of(field, options);
   CpuExtractor extractor(lattice, options, {});
   extractor.extract(tiles, bricks, nullptr);
   return std::move(extractor.mesh());
@@ -37,7 +48,7 @@ template <class T>
 std::uint64_t left_out_on_cpu(const Field<T>& field, const Lattice& lattice,
                               const BrickLookup& bricks, const SurfaceOptions& options) {
   CpuExtractor extractor(lattice, options, {});
-  extractor.extract(active_tiles(field, options.isovalue), bricks, nullptr);
+  extractor.extract(tiles_of(field, options), bricks, nullptr);
   return extractor.report().degenerate_triangles;
 }
 

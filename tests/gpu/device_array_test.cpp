@@ -87,6 +87,20 @@ TYPED_TEST(GpuArray, DegenerateTrianglesAreLeftOut) {
     }
 }
 
+TYPED_TEST(GpuArray, TheBorderIsCapped) {
+  const auto field = this->coarse({67, 41, 75}, 1);
+  const ArrayOnDevice<TypeParam> on_device(field, kSampleLayouts[2]);
+  CachedExtractor extractor(on_device.array);
+  for (const bool cap : {false, true, false})
+    for (const Inside inside : {Inside::above, Inside::below})
+      for (const double above : {0.0, 0.5, 1000.0}) {
+        SurfaceOptions options = surface(this->lowest() + 100 + above, field.extent, true);
+        options.cap = cap;
+        options.inside = inside;
+        expect_same(expected_mesh(field, options), extract(extractor, options).download());
+      }
+}
+
 TYPED_TEST(GpuArray, BothTopologiesInTurn) {
   const auto field = this->noise({67, 41, 75}, 1);
   const ArrayOnDevice<TypeParam> on_device(field, kSampleLayouts[2]);
@@ -259,9 +273,6 @@ TEST_F(GpuArrayOf, WhatMakesNoSenseIsRefused) {
   EXPECT_THROW(CachedExtractor(DeviceArray::of(field.samples.data(), field.extent)), UsageError);
   const ArrayOnDevice<float> on_device(field);
   CachedExtractor extractor(on_device.array);
-  SurfaceOptions capped = surface(0, field.extent);
-  capped.cap = true;
-  EXPECT_THROW(extract(extractor, capped), UsageError);
   EXPECT_THROW(extract(extractor, surface(std::nan(""), field.extent)), UsageError);
   EXPECT_THROW(extract(extractor, surface(0, field.extent), 1 << 4), UsageError);
   EXPECT_THROW(extract(extractor, surface(0, field.extent), 1 << 16), gpu::OutOfDeviceMemory);

@@ -90,6 +90,34 @@ TYPED_TEST(GpuResident, TheTrilinearInterpolantIsFollowed) {
   compare(this->noise({67, 41, 75}, 2), {mid}, options);
 }
 
+TYPED_TEST(GpuResident, TheBorderIsCapped) {
+  SurfaceOptions options;
+  options.cap = true;
+  const double mid = this->lowest() + 100;
+  for (const Inside inside : {Inside::above, Inside::below})
+    for (const Topology topology : {Topology::consistent, Topology::trilinear})
+      for (const bool drop : {false, true}) {
+        options.inside = inside;
+        options.topology = topology;
+        options.drop_degenerate = drop;
+        compare(this->coarse({67, 41, 75}, 1), {mid, mid + 0.5, mid + 1}, options);
+        compare(this->waves({131, 70, 97}), {mid - 40, mid}, options, 32);
+      }
+  for (unsigned seed = 0; seed < 40; ++seed) compare(this->at_a_corner(seed), {mid}, options);
+  options.roi = {{3, 0, 31}, {50, 33, 64}};
+  options.transform.spacing = {0.7, 1.3, -2};
+  compare(this->coarse({67, 41, 75}, 2), {mid}, options);
+}
+
+TYPED_TEST(GpuResident, TheTrilinearInterpolantWithoutDegenerateTriangles) {
+  SurfaceOptions options;
+  options.topology = Topology::trilinear;
+  options.drop_degenerate = true;
+  const double mid = this->lowest() + 100;
+  compare(this->coarse({67, 41, 75}, 1), {mid, mid + 0.5, mid + 1}, options);
+  compare(this->waves({131, 70, 97}), {mid - 40, mid}, options, 32);
+}
+
 /// A plane of edges at the volume's upper border, and no cell above it.
 TYPED_TEST(GpuResident, VolumesThatEndInsideATile) {
   const double mid = this->lowest() + 100;
@@ -270,11 +298,9 @@ TYPED_TEST(GpuResident, WhatTheDeviceCannotDoIsRefused) {
   gpu::DeviceVolume volume(lattice, bricks, 0);
   SurfaceOptions good;
   good.roi = lattice.box();
-  SurfaceOptions capped = good, local = good, nowhere = good;
-  capped.cap = true;
+  SurfaceOptions local = good, nowhere = good;
   local.indexing = Indexing::chunk_local;
   nowhere.roi = {{1000, 0, 0}, {1001, 1, 1}};
-  EXPECT_THROW(gpu::ResidentExtractor(volume, capped), UsageError);
   EXPECT_THROW(gpu::ResidentExtractor(volume, local), UsageError);
   EXPECT_THROW(gpu::ResidentExtractor(volume, nowhere), UsageError);
   gpu::ResidentExtractor extractor(volume, good);
@@ -298,6 +324,11 @@ TYPED_TEST(GpuResidentWithNaN, IsTheMeshOfTheCpu) {
   compare(this->waves({131, 70, 97}), {0, 30}, options);
   compare(with_nan(this->waves({131, 70, 97}), 1, 300), {0, -40}, options, 32);
   compare(with_nan(this->noise({67, 41, 75}, 2), 3, 20), {0}, options, 16);
+  options.cap = true;
+  for (const bool drop : {false, true}) {
+    options.drop_degenerate = drop;
+    compare(with_nan(this->coarse({67, 41, 75}, 2), 3, 300), {0}, options, 16);
+  }
   compare(with_nan(this->noise({33, 32, 34}, 5), 4, 3), {0}, options);
   compare(with_nan(this->waves({3, 1030, 1060}), 5, 50), {0}, options);
 }

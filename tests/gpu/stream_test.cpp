@@ -154,7 +154,7 @@ void compare(const Field<T>& field, double isovalue, SurfaceOptions options,
       const Lattice lattice{field.extent, {way.brick, way.brick, way.brick}, scalar_type_of<T>};
       const DenseBricks all(lattice, field.samples.data());
       if (!expected) expected = on_cpu(field, lattice, all, options);
-      const std::vector<TileWork> tiles = active_tiles(field, isovalue);
+      const std::vector<TileWork> tiles = tiles_of(field, options);
       const Streamed made = stream(lattice, all, options, tiles, way);
       expect_same(*expected, made.mesh);
       EXPECT_EQ(made.report.vertices, expected->positions.size());
@@ -309,6 +309,39 @@ TYPED_TEST(GpuStream, TheTrilinearInterpolantIsFollowed) {
   compare(this->noise(kOdd, 4), mid, options, {{5, 3, 64}});
 }
 
+TYPED_TEST(GpuStream, TheBorderIsCapped) {
+  SurfaceOptions options;
+  options.cap = true;
+  const double mid = this->lowest() + 100;
+  for (const Inside inside : {Inside::above, Inside::below})
+    for (const Topology topology : {Topology::consistent, Topology::trilinear})
+      for (const bool drop : {false, true}) {
+        options.inside = inside;
+        options.topology = topology;
+        options.drop_degenerate = drop;
+        compare(this->coarse(kOdd, 1), mid, options, {{5, 3, 64}});
+        compare(this->waves(kOdd), mid + 0.5, options, {{5, 3, 32}});
+      }
+  compare(this->coarse(kOdd, 1), mid, options, kManyWays);
+  for (unsigned seed = 0; seed < 40; ++seed)
+    compare(this->at_a_corner(seed), mid, options, {{1 + seed % 4, 3, 64}});
+  options.indexing = Indexing::chunk_local;
+  compare(this->coarse(kOdd, 3), mid, options, {{512, ~std::size_t{0}, 64}, {3, 4, 48}});
+  options.indexing = Indexing::welded;
+  options.roi = {{20, 3, 31}, {66, 40, 90}};
+  compare(this->coarse(kOdd, 4), mid, options, {{5, 3, 64}});
+}
+
+TYPED_TEST(GpuStream, TheTrilinearInterpolantWithoutDegenerateTriangles) {
+  SurfaceOptions options;
+  options.topology = Topology::trilinear;
+  options.drop_degenerate = true;
+  const double mid = this->lowest() + 100;
+  compare(this->coarse(kOdd, 1), mid, options, kManyWays);
+  options.indexing = Indexing::chunk_local;
+  compare(this->coarse(kOdd, 3), mid, options, {{512, ~std::size_t{0}, 64}, {3, 4, 48}});
+}
+
 template <class T>
 using GpuStreamWithNaN = DeviceTest<T>;
 
@@ -323,6 +356,9 @@ TYPED_TEST(GpuStreamWithNaN, IsTheMeshOfTheCpu) {
     compare(with_nan(this->noise(extent, 4), 5, 8), 0, options, {{512}, {1, 1, 16}});
   options.roi = {{31, 2, 30}, {66, 39, 75}};
   compare(with_nan(this->noise({67, 41, 75}, 2), 6, 20), 0, options, {{512}, {2, 3, 20}});
+  options.cap = true;
+  compare(with_nan(this->noise({67, 41, 75}, 2), 6, 300), 0, options, {{512}, {2, 3, 20}});
+  options.cap = false;
   options.indexing = Indexing::chunk_local;
   compare(with_nan(this->noise({67, 41, 75}, 2), 6, 20), 0, options, {{512}, {8, 5, 20}});
 }
@@ -381,7 +417,7 @@ TYPED_TEST(GpuStream, TheSinkMayFail) {
   EXPECT_EQ(sink.taken, 3);
 }
 
-TEST(GpuExtractor, WhatHasNoKernelsIsRefused) {
+TEST(GpuExtractor, WhatIsNoSurfaceIsRefused) {
   if (!gpu::device_available()) GTEST_SKIP() << "no CUDA device";
   const auto refused = [](ScalarType type, auto change) {
     const Lattice lattice{{64, 64, 64}, {64, 64, 64}, type};
@@ -392,11 +428,6 @@ TEST(GpuExtractor, WhatHasNoKernelsIsRefused) {
         gpu::GpuExtractor(0, lattice, options, gpu::stream_sizes(lattice, options, 1), sink),
         UsageError);
   };
-  refused(ScalarType::u8, [](SurfaceOptions& o) { o.cap = true; });
-  refused(ScalarType::u8, [](SurfaceOptions& o) {
-    o.topology = Topology::trilinear;
-    o.drop_degenerate = true;
-  });
   refused(ScalarType::u8, [](SurfaceOptions& o) { o.isovalue = std::nan(""); });
   refused(ScalarType::u8, [](SurfaceOptions& o) { o.roi = {{99, 0, 0}, {100, 1, 1}}; });
 }

@@ -115,6 +115,22 @@ TYPED_TEST(DeviceStoreOf, TheTrilinearInterpolantIsFollowed) {
   testing::expect_same(on_cpu(*opened, options), extract_to_device(*opened, options).download());
 }
 
+TYPED_TEST(DeviceStoreOf, TheBorderIsCapped) {
+  const auto opened = this->template convert<TypeParam>({83, 70, 67}, BrickCodec::packed);
+  for (const bool both : {false, true}) {
+    ExtractOptions options{.isovalue = std::round(this->middle(*opened)),
+                           .inside = both ? Inside::below : Inside::above,
+                           .normals = true,
+                           .drop_degenerate = both,
+                           .topology = both ? Topology::trilinear : Topology::consistent,
+                           .cap = true,
+                           .threads = 2};
+    testing::expect_same(on_cpu(*opened, options), extract_to_device(*opened, options).download());
+    DeviceExtractor extractor(*opened, options);
+    testing::expect_same(on_cpu(*opened, options), extractor.extract(options).download());
+  }
+}
+
 /// The pieces of a mesh are those of the CPU, and so is the mesh that they become.
 TYPED_TEST(DeviceStoreOf, PiecesAreThoseOfTheCpu) {
   const auto opened = this->template convert<TypeParam>({150, 140, 131}, BrickCodec::packed);
@@ -126,6 +142,7 @@ TYPED_TEST(DeviceStoreOf, PiecesAreThoseOfTheCpu) {
         ExtractOptions options{.isovalue = isovalue,
                                .normals = number % 2 == 0,
                                .drop_degenerate = drop,
+                               .cap = drop,
                                .threads = 2,
                                .backend = Backend::cpu};
         const auto cpu = this->folder_ / "cpu.piece", gpu = this->folder_ / "gpu.piece";
@@ -218,9 +235,6 @@ TEST_F(DeviceStore, WhatTheDeviceCannotDoIsRefused) {
   for (const ExtractOptions& options :
        {ExtractOptions{.isovalue = isovalue, .level = 9},
         ExtractOptions{.isovalue = std::numeric_limits<double>::quiet_NaN()},
-        ExtractOptions{
-            .isovalue = isovalue, .drop_degenerate = true, .topology = Topology::trilinear},
-        ExtractOptions{.isovalue = isovalue, .cap = true},
         ExtractOptions{.isovalue = isovalue, .backend = Backend::cpu},
         ExtractOptions{.isovalue = isovalue, .device = 99}})
     EXPECT_THROW(extract_to_device(store, options), UsageError);

@@ -98,19 +98,6 @@ TEST_F(Backend, OptionsThatMakeNoSense) {
   EXPECT_EQ(files(), Arguments{"a.zarr"});
 }
 
-TEST_F(Backend, WhatHasNoKernelsIsRefusedAndAutoTakesTheCpu) {
-  const std::string store = make_store("a");
-  expect_refused(on_cuda(store, {"--cap"}), 2, {"--backend cuda: ", "capped", "--backend cpu"});
-  const Arguments trilinear{"--topology", "trilinear", "--drop-degenerate"};
-  expect_refused(on_cuda(store, trilinear), 2, {"--backend cuda: ", "trilinear", "--backend cpu"});
-  EXPECT_FALSE(std::filesystem::exists(path("a.ply")));
-  for (const Arguments& option : {Arguments{"--cap"}, trilinear}) {
-    Arguments all{"extract", store, "--isovalue", "127.5", "-o", path("auto.ply"), "--force"};
-    all.insert(all.end(), option.begin(), option.end());
-    EXPECT_EQ(run_json(all)["surfaces"][0]["backend"], "cpu");
-  }
-}
-
 TEST_F(Backend, WithoutADeviceCudaIsRefusedAndAutoTakesTheCpu) {
   const std::string store = make_store("a");
   const Outcome refused = on_cuda(store);
@@ -192,8 +179,19 @@ TEST_F(Cuda, TheTrilinearInterpolantIsFollowed) {
   compare(store, ".ply", {"--topology", "trilinear"}, {"--resume"});
 }
 
+TEST_F(Cuda, TheBorderIsCapped) {
+  const std::string store = waves("f32", {"--brick", "32", "--noise", "0.5"});
+  for (const char* extension : {".ply", ".stl"}) {
+    compare(store, extension, {"--cap"});
+    compare(store, extension, {"--cap", "--inside", "below", "--topology", "trilinear"});
+  }
+  compare(waves("u8", {"--brick", "32"}), ".ply",
+          {"--cap", "--drop-degenerate", "--topology", "trilinear", "--roi", "11:99,40:,:77"});
+}
+
 TEST_F(Cuda, SurfacesByWayOfPiecesAreThoseOfTheCpu) {
   const std::string store = waves("u16", {"--brick", "32"});
+  compare(store, ".ply", {"--cap", "--drop-degenerate"}, {"--resume"});
   compare(store, ".ply", {"--normals", "gradient"}, {"--resume"});
   compare(store, ".stl", {"--drop-degenerate"}, {"--resume"});
 }
@@ -297,6 +295,7 @@ TEST_F(ResidentCuda, FilesAreThoseOfTheCpu) {
     compare_all(store, isovalues, ".ply", {"--normals", "gradient"}, "256M", 3);
     compare_all(store, isovalues, ".ply", {"--roi", "11:99,40:,:77"}, "256M", 3);
     compare_all(store, isovalues, ".ply", {"--drop-degenerate"}, "256M", 3);
+    compare_all(store, isovalues, ".ply", {"--cap", "--drop-degenerate"}, "256M", 3);
   }
 }
 

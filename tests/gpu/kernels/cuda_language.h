@@ -17,6 +17,7 @@
 #define __device__
 #define __host__
 #define __shared__ thread_local
+#define __constant__
 #define __grid_constant__
 #define __launch_bounds__(...)
 #define __align__(bytes) __attribute__((aligned(bytes)))

@@ -10,6 +10,7 @@
 
 #include "core/morton.h"
 #include "gpu/resident/resident_sizes.h"
+#include "gpu/tile/on_samples.h"
 #include "gpu/tile/tile_block.h"
 #include "surface/surface_extractor.h"
 #include "surface/topology_tables.h"
@@ -153,6 +154,9 @@ class KernelVolume {
     std::ranges::copy(t.roi_lo, p.roi_lo);
     std::ranges::copy(t.roi_hi, p.roi_hi);
     p.isovalue = isovalue;
+    p.cap = options.cap;
+    p.below = options.inside == Inside::below;
+    p.everywhere = options.may_have_nan;
     return p;
   }
 
@@ -161,6 +165,7 @@ class KernelVolume {
     SurfaceOptions o = options;
     o.isovalue = isovalue;
     gpu::TileParams p = params_of(lattice, o);
+    p.on_samples = gpu::sample_params(lattice.type, o);
     p.tile_blocks = tile_blocks_.data();
     p.columns = columns_.data();
     p.block_of_tile = block_of_tile_.data();
@@ -236,7 +241,7 @@ struct KernelState {
   std::vector<gpu::RowTable> row_tables;
   std::vector<gpu::SampleTable> sample_tables;
   static constexpr unsigned kBlocks = 3;  ///< at most, of an extraction
-  std::vector<gpu::CoincidentWork> work;
+  std::vector<gpu::SampleWork> work;
   std::vector<gpu::TrilinearWork> trilinear_work;
   std::uint32_t launches = 0, epoch = 0;
   unsigned long long number_start = 0, number_end = 0;
@@ -270,7 +275,9 @@ struct KernelState {
     p.number_start = &number_start;
     p.number_end = &number_end;
     p.ticket = zeroed_words() + 1;
-    p.coincident = {work.data(), sample_tables.data(), nullptr, &zeroed[2]};
+    p.on_samples.work = work.data();
+    p.on_samples.tables = sample_tables.data();
+    p.on_samples.left_out = &zeroed[2];
     p.trilinear = {trilinear_work.data(), &topology_tables()};
     p.end = {&report,
              ++launches,

@@ -50,12 +50,16 @@ class Streamed {
     p.order = order.data();
     p.number_start = &start;
     p.number_end = &end;
-    p.coincident = {work_.data(), sample_tables_.data(), neighbours_.data(), &totals.left_out};
+    p.on_samples = gpu::sample_params(lattice_.type, options_);
+    p.on_samples.work = work_.data();
+    p.on_samples.tables = sample_tables_.data();
+    p.on_samples.neighbours = neighbours_.data();
+    p.on_samples.left_out = &totals.left_out;
     p.trilinear = {trilinear_work_.data(), &topology_tables()};
     emulated::run_tiles({.type = lattice_.type,
                          .normals = options_.normals,
                          .may_have_nan = options_.may_have_nan,
-                         .drop_degenerate = options_.drop_degenerate,
+                         .on_samples = gpu::has_samples(options_),
                          .trilinear = options_.topology == Topology::trilinear,
                          .blocks = std::min(3u, count_),
                          .seed = ++epoch_},
@@ -123,7 +127,7 @@ class Streamed {
     u.bricks = addresses_.data();
     u.tile_bricks = tile_bricks_;
     u.reach = static_cast<int>(reach());
-    u.corners = options_.may_have_nan || options_.drop_degenerate;
+    u.corners = options_.may_have_nan || gpu::has_samples(options_);
     for (int axis = 0; axis < 3; ++axis) {
       u.brick[axis] = static_cast<std::int32_t>(lattice_.brick[axis]);
       u.extent[axis] = static_cast<std::int32_t>(lattice_.extent[axis]);
@@ -150,7 +154,7 @@ class Streamed {
   gpu::RowSlots slots_;
   std::vector<gpu::RowTable> row_tables_;
   std::vector<gpu::SampleTable> sample_tables_;
-  std::vector<gpu::CoincidentWork> work_;
+  std::vector<gpu::SampleWork> work_;
   std::vector<gpu::TrilinearWork> trilinear_work_ = std::vector<gpu::TrilinearWork>(3);
   gpu::CaseTable cases_;
   std::uint32_t tile_bricks_, count_ = 0, epoch_ = 0;
@@ -178,7 +182,7 @@ void compare(const Field<T>& field, const Lattice& lattice, const BrickLookup& b
     const isobrick::Mesh expected =
         expected_mesh(field, lattice, bricks, options, options.isovalue);
     ASSERT_GT(expected.triangles.size(), 0u);
-    std::vector<TileWork> tiles = active_tiles(field, options.isovalue);
+    std::vector<TileWork> tiles = tiles_of(field, options);
     if (options.may_have_nan)
       for (TileWork& tile : tiles) tile.active_blocks = 0xff;
     MeshRoom room(expected.positions.size(), expected.triangles.size());
@@ -260,6 +264,20 @@ TYPED_TEST(StreamKernels, TheTrilinearInterpolantIsFollowed) {
   compare_field(TestFields<TypeParam>::coarse({40, 34, 40}, 7), 100);
 }
 
+TYPED_TEST(StreamKernels, TheBorderIsCapped) {
+  SurfaceOptions options;
+  options.isovalue = TestFixture::kMid;
+  options.cap = true;
+  const auto coarse = TestFields<TypeParam>::coarse({40, 34, 35}, 7);
+  const Lattice lattice{coarse.extent, {16, 40, 23}, scalar_type_of<TypeParam>};
+  const DenseBricks bricks(lattice, coarse.samples.data());
+  compare(coarse, lattice, bricks, options, 100);
+  options.drop_degenerate = true;
+  options.topology = Topology::trilinear;
+  options.inside = Inside::below;
+  compare(coarse, lattice, bricks, options, 3);
+}
+
 struct NoPlaces final : TilePlaces {
   void place(const TilePlace&) override {}
 };
@@ -270,20 +288,22 @@ TYPED_TEST(StreamKernels, APartOfTheTiles) {
   const Lattice lattice{field.extent, {16, 40, 23}, scalar_type_of<TypeParam>};
   const DenseBricks bricks(lattice, field.samples.data());
   struct Kind {
-    bool drop;
+    bool drop, cap;
     Topology topology;
   };
-  for (const auto& [drop, topology] : {Kind{false, Topology::consistent},
-                                       {true, Topology::consistent},
-                                       {false, Topology::trilinear}})
+  for (const auto& [drop, cap, topology] : {Kind{false, false, Topology::consistent},
+                                            {true, false, Topology::consistent},
+                                            {false, false, Topology::trilinear},
+                                            {true, true, Topology::trilinear}})
     for (const std::uint64_t begin : {1u, 64u}) {  // tiles (1, 0, 0) and (4, 0, 0)
       SurfaceOptions options;
       options.topology = topology;
       options.isovalue = TestFixture::kMid;
       options.roi = lattice.box();
       options.drop_degenerate = drop;
-      const TileRange part{begin, begin + 4, drop, lattice.tiles()};
-      std::vector<TileWork> tiles = active_tiles(field, options.isovalue);
+      options.cap = cap;
+      const TileRange part{begin, begin + 4, drop || cap, lattice.tiles()};
+      std::vector<TileWork> tiles = tiles_of(field, options);
       std::erase_if(tiles, [&](const TileWork& work) { return !part.needs(work.tile); });
       const auto own = std::ranges::find_if(
           tiles, [&](const TileWork& work) { return part.contains(work.tile); });

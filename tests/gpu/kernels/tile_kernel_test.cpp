@@ -27,7 +27,7 @@ void compare(const KernelVolume<T>& volume, TileRun run, const std::vector<doubl
   run.type = scalar_type_of<T>;
   run.normals = volume.options.normals;
   run.may_have_nan = volume.options.may_have_nan;
-  run.drop_degenerate = volume.options.drop_degenerate;
+  run.on_samples = gpu::has_samples(volume.options);
   run.trilinear = volume.options.topology == Topology::trilinear;
   KernelState state(volume.tiles(), volume.grid_tiles());
   std::size_t made = 0;
@@ -39,7 +39,7 @@ void compare(const KernelVolume<T>& volume, TileRun run, const std::vector<doubl
     MeshRoom room(expected.positions.size(), expected.triangles.size());
     run_both(volume, run, isovalue, state, room);
     room.expect(expected);
-    state.expect_reported(expected, run.drop_degenerate ? volume.left_out(isovalue) : 0);
+    state.expect_reported(expected, run.on_samples ? volume.left_out(isovalue) : 0);
     state.expect_zeroed();
     ++run.seed;
     made += expected.triangles.size();
@@ -215,6 +215,79 @@ TEST(TileKernelOf, DegenerateTrianglesBesideNaN) {
   options.drop_degenerate = options.may_have_nan = true;
   compare(with_nan(TestFields<float>::coarse({40, 50, 34}, 1), 2, 20), {}, {0}, options);
   compare(with_nan(TestFields<double>::coarse({33, 50, 34}, 1), 2, 5), {}, {1}, options);
+}
+
+TYPED_TEST(TileKernel, TheBorderIsCapped) {
+  constexpr double mid = TestFixture::kMid;
+  SurfaceOptions options;
+  options.cap = true;
+  const auto coarse = TestFixture::Fields::coarse({34, 35, 5}, 1);
+  for (const Inside inside : {Inside::above, Inside::below})
+    for (const Topology topology : {Topology::consistent, Topology::trilinear}) {
+      options.inside = inside;
+      options.topology = topology;
+      options.drop_degenerate = false;
+      compare(TestFixture::Fields::waves({67, 34, 5}), {.blocks = 3}, {mid + 0.5}, options);
+      options.drop_degenerate = true;
+      compare(coarse, {}, {mid, mid + 0.5}, options);
+    }
+}
+
+TYPED_TEST(TileKernel, TheCapOfARegion) {
+  SurfaceOptions options;
+  options.cap = options.drop_degenerate = true;
+  options.roi = {{3, 0, 31}, {50, 33, 40}};
+  options.transform.spacing = {0.7, 1.3, -2};
+  options.transform.direction = {0, -1, 0, 1, 0, 0, 0, 0, 1};
+  for (const Inside inside : {Inside::above, Inside::below}) {
+    options.inside = inside;
+    compare(TestFixture::Fields::coarse({55, 35, 44}, 5), {}, {TestFixture::kMid}, options);
+  }
+}
+
+/// Nothing but the border, whether or not a sample reaches the isovalue.
+TYPED_TEST(TileKernel, TheCapOfABox) {
+  SurfaceOptions options;
+  options.cap = true;
+  const auto field = TestFixture::Fields::waves({40, 33, 2});
+  const std::vector<double> below{TestFixture::Fields::lowest() - 1}, above{1e30};
+  compare(field, {}, below, options);
+  options.inside = Inside::below;
+  compare(field, {}, above, options);
+}
+
+TEST(TileKernelOf, CapsAtTheCornerOfEightTiles) {
+  SurfaceOptions options;
+  options.cap = true;
+  for (unsigned seed = 0; seed < 16; ++seed) {
+    options.drop_degenerate = seed % 2 != 0;
+    options.roi = {{seed % 3 == 0 ? 32 : 31, seed % 5 == 0 ? 32 : 0, 0}, {45, 40, 33}};
+    compare(TestFields<std::int16_t>::at_a_corner(seed), {.seed = seed}, {0}, options);
+  }
+}
+
+TEST(TileKernelOf, CapsBesideNaN) {
+  SurfaceOptions options;
+  options.cap = options.may_have_nan = true;
+  for (const bool drop : {false, true})
+    for (const Topology topology : {Topology::consistent, Topology::trilinear}) {
+      options.drop_degenerate = drop;
+      options.topology = topology;
+      compare(with_nan(TestFields<float>::coarse({40, 50, 34}, 1), 2, 20), {}, {0}, options);
+      compare(with_nan(TestFields<double>::coarse({33, 50, 34}, 1), 2, 300), {}, {1}, options);
+    }
+}
+
+TYPED_TEST(TileKernel, TheTrilinearInterpolantWithoutDegenerateTriangles) {
+  SurfaceOptions options;
+  options.topology = Topology::trilinear;
+  options.drop_degenerate = true;
+  constexpr double mid = TestFixture::kMid;
+  compare(TestFixture::Fields::coarse({34, 35, 12}, 1), {.blocks = 3}, {mid, mid + 1}, options);
+  options.roi = {{3, 0, 31}, {50, 33, 40}};
+  options.transform.spacing = {0.7, 1.3, -2};
+  options.inside = Inside::below;
+  compare(TestFixture::Fields::coarse({55, 35, 44}, 5), {}, {mid}, options);
 }
 
 TYPED_TEST(TileKernel, TheTrilinearInterpolantIsFollowed) {

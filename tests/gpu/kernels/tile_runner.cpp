@@ -47,11 +47,15 @@ auto with_nan_kernel(const TileRun& r, F& f) {
 
 template <class F>
 auto with_kernel(const TileRun& r, F&& f) {
-  if (r.drop_degenerate)
+  if (r.on_samples)
     return visit_scalar(r.type, [&](auto tag) {
       using T = typename decltype(tag)::type;
-      return r.normals ? f(Kernel<384, T, true, true, gpu::TileExtra::coincident>())
-                       : f(Kernel<384, T, false, true, gpu::TileExtra::coincident>());
+      using gpu::TileExtra;
+      if (r.trilinear)
+        return r.normals ? f(Kernel<384, T, true, true, TileExtra::both>())
+                         : f(Kernel<384, T, false, true, TileExtra::both>());
+      return r.normals ? f(Kernel<384, T, true, true, TileExtra::on_samples>())
+                       : f(Kernel<384, T, false, true, TileExtra::on_samples>());
     });
   if (r.trilinear)
     return visit_scalar(r.type, [&](auto tag) {

@@ -14,7 +14,7 @@ namespace isobrick::emulated {
 /// A kernel that extracts tiles, and how it is run.
 struct TileRun {
   ScalarType type;
-  bool normals = false, may_have_nan = false, drop_degenerate = false, trilinear = false;
+  bool normals = false, may_have_nan = false, on_samples = false, trilinear = false;
   unsigned threads = 384;
   unsigned blocks = 2;
   unsigned seed = 1;
