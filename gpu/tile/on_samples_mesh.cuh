@@ -177,40 +177,43 @@ __device__ inline void write_kept_triangles(const TileShared& s, const TileParam
 }
 
 /// The tile's last triangles. They face away from the cells, so only left-handed axes turn them
-/// round. A row a warp, a cell a thread.
+/// round.
 template <int N, class T, bool Trilinear>
 __device__ inline void write_cap_triangles(const TileShared& s, const TileParams& p) {
   const SampleWork& w = sample_work(p);
   if (w.capped == 0 || s.triangle_base + s.all_triangles > p.triangle_capacity) return;
   Triangle* const first = p.triangles + s.triangle_base + (s.all_triangles - w.capped);
   const int second = p.world.mirrored != p.on_samples.below ? 2 : 1;
-  const auto x = static_cast<int>(lane_id());
-  for (auto r = static_cast<int>(warp_id()); r < 32 * 32; r += BlockConfig<N>::kWarps) {
-    const int y = r % 32, z = r / 32, row = 33 * z + y;
-    if (w.cap[row] == w.cap[row + 1]) continue;
-    std::uint32_t count = 0;
-    for_each_cap_face<T, Trilinear>(s, p, w, x, y, z,
-                                    [&](int, std::uint32_t, std::uint32_t, const KeptOfCell& kept) {
-                                      count += static_cast<std::uint32_t>(__popc(kept.triangles));
-                                    });
-    __syncwarp();
-    Triangle* to = first + w.cap[row] + (warp_inclusive_sum(count) - count);
-    const VertexNumbers number(s, p, row, x);
-    for_each_cap_face<T, Trilinear>(
-        s, p, w, x, y, z,
-        [&](int face, std::uint32_t polygon, std::uint32_t at, const KeptOfCell& kept) {
-          for (std::uint32_t left = kept.triangles; left; left &= left - 1, ++to) {
-            const auto t = static_cast<std::uint32_t>(__ffs(static_cast<int>(left)) - 1);
-            for (int c = 0; c < 3; ++c)
-              __stcs(&(*to)[static_cast<std::size_t>(c)], number(cap_vertex(face, polygon, t,
-                                                                            c == 0   ? 0
-                                                                            : c == 1 ? second
-                                                                                     : 3 - second,
-                                                                            at)));
-          }
-        });
-    __syncwarp();
-  }
+  for_each_bit<N>(
+      w.border, w.border_before, w.all_border,
+      [&](std::uint32_t group, bool is_cell, int row, int x) {
+        const auto z = static_cast<int>(z_of_row(static_cast<std::uint32_t>(row))),
+                   y = row - 33 * z;
+        std::uint32_t count = 0;
+        if (is_cell)
+          for_each_cap_face<T, Trilinear>(
+              s, p, w, x, y, z, [&](int, std::uint32_t, std::uint32_t, const KeptOfCell& kept) {
+                count += static_cast<std::uint32_t>(__popc(kept.triangles));
+              });
+        __syncwarp();
+        Triangle* to = first + w.cap[group] + (warp_inclusive_sum(count) - count);
+        if (count == 0) return;
+        const VertexNumbers number(s, p, row, x);
+        for_each_cap_face<T, Trilinear>(
+            s, p, w, x, y, z,
+            [&](int face, std::uint32_t polygon, std::uint32_t at, const KeptOfCell& kept) {
+              for (std::uint32_t left = kept.triangles; left; left &= left - 1, ++to) {
+                const auto t = static_cast<std::uint32_t>(__ffs(static_cast<int>(left)) - 1);
+                for (int c = 0; c < 3; ++c)
+                  __stcs(&(*to)[static_cast<std::size_t>(c)],
+                         number(cap_vertex(face, polygon, t,
+                                           c == 0   ? 0
+                                           : c == 1 ? second
+                                                    : 3 - second,
+                                           at)));
+              }
+            });
+      });
 }
 
 }  // namespace isobrick::gpu

@@ -39,17 +39,22 @@ struct SampleWork {
   unsigned long long inside[kRowsAround], at[kRowsAround];
   /// Bit x + 1 of row (y + 1) + kCellsAround · (z + 1): the cell exists.
   unsigned long long there[kCellsAround * kCellsAround];
-  unsigned long long used[kRowsOfTile];   ///< bit x: a triangle has a corner on sample x
-  std::uint32_t cells[kRowsOfTile];       ///< active cells with a coincident vertex, in no list
-  std::uint32_t triangles[kRowsOfTile];   ///< kept ones of such cells in the rows before
-  std::uint32_t cap[kRowsOfTile];         ///< triangles of the cap in the rows before
-  std::uint8_t owners[33 * kRowsOfTile];  ///< which tile makes a used vertex, if not this one
-  std::uint32_t any_at, any_missing;      ///< whether there are such samples; such cells lack
-  std::uint32_t own, kept, capped;        ///< vertices; triangles of cells, of the cap
-  std::uint32_t left_out;                 ///< triangles
-  std::uint32_t other_owners;             ///< bits: tiles around that make used vertices
-  std::uint32_t first_number[27];         ///< in the mesh, of their vertices on samples
-  const SampleTable* tables[27];          ///< theirs
+  unsigned long long used[kRowsOfTile];      ///< bit x: a triangle has a corner on sample x
+  std::uint32_t cells[kRowsOfTile];          ///< active cells with a coincident vertex, in no list
+  std::uint32_t triangles[kRowsOfTile];      ///< kept ones of such cells in the rows before
+  std::uint32_t border[kRowsOfTile];         ///< cells at the border with a corner inside
+  std::uint32_t border_before[kRowsOfTile];  ///< of these in the rows before
+  std::uint32_t cap[kRowsOfTile];            ///< triangles of 32 of these each, in those before
+  unsigned long long asked[kRowsOfTile];     ///< used samples that another tile may have made
+  std::uint32_t asked_before[kRowsOfTile];   ///< of these in the rows before
+  std::uint8_t owners[33 * kRowsOfTile];     ///< which tile makes a used vertex, if not this one
+  std::uint32_t any_at, any_missing;         ///< whether there are such samples; such cells lack
+  std::uint32_t own, kept, capped;           ///< vertices; triangles of cells, of the cap
+  std::uint32_t all_border, all_asked;       ///< cells; samples
+  std::uint32_t left_out;                    ///< triangles
+  std::uint32_t other_owners;                ///< bits: tiles around that make used vertices
+  std::uint32_t first_number[27];            ///< in the mesh, of their vertices on samples
+  const SampleTable* tables[27];             ///< theirs
 };
 
 /// Blocks of threads that such a kernel has at most: each has a SampleWork.

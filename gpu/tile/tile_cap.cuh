@@ -23,7 +23,7 @@ constexpr CapTable make_cap_table() {
     }
   return table;
 }
-static __constant__ const CapTable kCapTable = make_cap_table();
+static __device__ const CapTable kCapTable = make_cap_table();
 
 /// Vertex `i` of triangle `t` on a face, as vertex_on() names it.
 __device__ inline std::uint32_t cap_vertex(int face, std::uint32_t polygon, std::uint32_t t, int i,
@@ -113,30 +113,56 @@ __device__ inline void for_each_cap_face(const TileShared& s, const TileParams& 
   }
 }
 
-/// Counts the triangles of the tile's cap and marks the samples that they have vertices on. A row a
-/// warp, a cell a thread.
+/// The cells of a row that are at the border and have a corner inside, as bits.
+__device__ inline std::uint32_t border_cells(const SampleWork& w, const TileParams& p, int y,
+                                             int z) {
+  const unsigned long long there = cells_there(w, y, z);
+  const unsigned long long around = there << 1 & there >> 1 & cells_there(w, y - 1, z) &
+                                    cells_there(w, y + 1, z) & cells_there(w, y, z - 1) &
+                                    cells_there(w, y, z + 1);
+  const unsigned long long flip = p.on_samples.below ? ~0ull : 0ull;
+  const unsigned long long* inside = w.inside + (z + 1) * kEdgeAround + y + 1;
+  const unsigned long long any = (inside[0] ^ flip) | (inside[1] ^ flip) |
+                                 (inside[kEdgeAround] ^ flip) | (inside[kEdgeAround + 1] ^ flip);
+  return static_cast<std::uint32_t>((there & ~around & (any | any >> 1)) >> 1);
+}
+
+/// Counts the triangles of the tile's cap and marks the samples that they have vertices on.
 template <int N, class T, bool Trilinear>
 __device__ inline void count_cap(const TileShared& s, const TileParams& p, SampleWork& w) {
-  const auto x = static_cast<int>(lane_id());
-  for (auto r = static_cast<int>(warp_id()); r < 32 * 32; r += BlockConfig<N>::kWarps) {
-    const int y = r % 32, z = r / 32, row = 33 * z + y;
-    std::uint32_t triangles = 0, left_out = 0, corners = 0;
-    for_each_cap_face<T, Trilinear>(
-        s, p, w, x, y, z, [&](int, std::uint32_t polygon, std::uint32_t, const KeptOfCell& kept) {
-          const auto n = static_cast<std::uint32_t>(__popc(kept.triangles));
-          triangles += n;
-          left_out += kCapTable.polygons[polygon].triangles - n;
-          corners |= kept.corners;
-        });
-    __syncwarp();
-    if (!__any_sync(kFullMask, (triangles | left_out) != 0)) continue;
-    mark_corners(w, row, corners);
-    triangles = warp_sum(triangles);
-    left_out = warp_sum(left_out);
-    if (lane_id() > 0) continue;
-    w.cap[row] = triangles;
-    if (left_out > 0) atomicAdd(&w.left_out, left_out);
+  for (auto row = static_cast<int>(own_thread()); row < kRowsOfTile; row += N) {
+    const auto z = static_cast<int>(z_of_row(static_cast<std::uint32_t>(row))), y = row - 33 * z;
+    w.border[row] = y < 32 && z < 32 ? border_cells(w, p, y, z) : 0;
+    w.border_before[row] = static_cast<std::uint32_t>(__popc(w.border[row]));
   }
+  __syncthreads();
+  if (warp_id() == 0) {
+    const std::uint32_t all = sum_rows(w.border_before);
+    if (lane_id() == 0) w.all_border = all;
+  }
+  __syncthreads();
+  for_each_bit<N>(w.border, w.border_before, w.all_border,
+                  [&](std::uint32_t group, bool is_cell, int row, int x) {
+                    const auto z = static_cast<int>(z_of_row(static_cast<std::uint32_t>(row))),
+                               y = row - 33 * z;
+                    std::uint32_t triangles = 0, left_out = 0, corners = 0;
+                    if (is_cell)
+                      for_each_cap_face<T, Trilinear>(
+                          s, p, w, x, y, z,
+                          [&](int, std::uint32_t polygon, std::uint32_t, const KeptOfCell& kept) {
+                            const auto n = static_cast<std::uint32_t>(__popc(kept.triangles));
+                            triangles += n;
+                            left_out += kCapTable.polygons[polygon].triangles - n;
+                            corners |= kept.corners;
+                          });
+                    mark_corners_of(w, row, x, corners);
+                    __syncwarp();
+                    triangles = warp_sum(triangles);
+                    left_out = warp_sum(left_out);
+                    if (lane_id() > 0) return;
+                    w.cap[group] = triangles;
+                    if (left_out > 0) atomicAdd(&w.left_out, left_out);
+                  });
 }
 
 }  // namespace isobrick::gpu

@@ -78,6 +78,14 @@ struct KeptOfCell {
   }
 };
 
+/// Marks the corners of a cell that triangles have vertices on.
+__device__ inline void mark_corners_of(SampleWork& w, int row, int x, std::uint32_t corners) {
+#pragma unroll
+  for (int pair = 0; pair < 4; ++pair)
+    if (const unsigned long long two = corners >> 2 * pair & 3u)
+      atomicOr(&w.used[row + (pair & 1) + 33 * (pair >> 1)], two << x);
+}
+
 /// Marks the corners of a row's cells that triangles have vertices on. Whole warps, a cell a
 /// thread.
 __device__ inline void mark_corners(SampleWork& w, int row, std::uint32_t corners) {
@@ -107,6 +115,39 @@ __device__ inline std::uint32_t sum_rows(Int (&counts)[kRowsOfTile]) {
     before += count;
   }
   return __shfl_sync(kFullMask, sum, 31);
+}
+
+/// Which of a mask's bits is number `n`, counted from 0.
+__device__ inline int bit_number(unsigned long long mask, std::uint32_t n) {
+  int bit = 0;
+#pragma unroll
+  for (int half = 32; half > 0; half /= 2) {
+    const std::uint32_t below = popc_64(mask & bits_below(half));
+    if (n < below) continue;
+    n -= below;
+    mask >>= half;
+    bit += half;
+  }
+  return bit;
+}
+
+/// Calls f(group, exists, row, bit) for the bits of rows, 32 a warp, however they lie in rows. All
+/// threads of a warp come along; `exists` is false for those without a bit. `before`: bits in the
+/// rows before (sum_rows), and `all` of them.
+template <int N, class Mask, class F>
+__device__ inline void for_each_bit(const Mask (&masks)[kRowsOfTile],
+                                    const std::uint32_t (&before)[kRowsOfTile], std::uint32_t all,
+                                    F&& f) {
+  for (std::uint32_t first = 32 * warp_id(); first < all; first += N) {
+    const std::uint32_t number = first + lane_id();
+    int row = 0;
+    // The last row with no more bits before it.
+    for (int step = 1024; step > 0; step /= 2)
+      if (row + step < kRowsOfTile && before[row + step] <= number) row += step;
+    const bool exists = number < all;
+    f(first / 32, exists, row, exists ? bit_number(masks[row], number - before[row]) : 0);
+    __syncwarp();
+  }
 }
 
 }  // namespace isobrick::gpu

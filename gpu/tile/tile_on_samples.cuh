@@ -29,24 +29,24 @@ __device__ inline std::uint32_t surface_corners(const TileShared& s, const TileP
   }
 }
 
-/// The corners of a cell that triangles of the cap have vertices on. Without coincident vertices
-/// these are all corners of border faces, as the sample that is asked for is inside.
+/// Whether triangles of the cap have a vertex on a corner of a cell; without coincident vertices
+/// the sample is inside, and so it is where there is a border face.
 template <class T, bool Trilinear>
-__device__ inline std::uint32_t cap_corners(const TileShared& s, const TileParams& p,
-                                            const SampleWork& w, int x, int y, int z) {
-  if (!exists(w, x, y, z)) return 0;
+__device__ inline bool cap_has(const TileShared& s, const TileParams& p, const SampleWork& w, int x,
+                               int y, int z, int corner) {
+  if (!exists(w, x, y, z)) return false;
+  const auto lacks = [&](int axis) {
+    const int step = corner >> axis & 1 ? 1 : -1;
+    return !exists(w, x + (axis == 0 ? step : 0), y + (axis == 1 ? step : 0),
+                   z + (axis == 2 ? step : 0));
+  };
+  if (!lacks(0) && !lacks(1) && !lacks(2)) return false;
+  if (!w.any_at || corners_at(w.at, x, y, z) == 0) return true;
   std::uint32_t corners = 0;
-  if (corners_at(w.at, x, y, z) == 0) {
-    const std::uint32_t faces = border_faces(w, x, y, z);
-    for (int face = 0; face < 6; ++face)
-      for (int i = 0; i < 4; ++i)
-        if (faces >> face & 1u) corners |= 1u << kCapTable.corners[face][i];
-    return corners;
-  }
   for_each_cap_face<T, Trilinear>(
       s, p, w, x, y, z,
       [&](int, std::uint32_t, std::uint32_t, const KeptOfCell& kept) { corners |= kept.corners; });
-  return corners;
+  return (corners >> corner & 1u) != 0;
 }
 
 /// Whether a layer of cells around the tile is not all in the region of interest.
@@ -114,44 +114,47 @@ __device__ inline std::uint32_t owner_of(const TileShared& s, const TileParams& 
     const int cx = x - (corner & 1), cy = y - (corner >> 1 & 1), cz = z - (corner >> 2);
     const int other[3] = {side(cx), side(cy), side(cz)};
     if (!comes_before(s.tile, other, first)) continue;
-    std::uint32_t corners = surface_corners<T, Trilinear>(s, p, w, cx, cy, cz);
-    if (!(corners >> corner & 1u) && p.on_samples.cap && w.any_missing)
-      corners = cap_corners<T, Trilinear>(s, p, w, cx, cy, cz);
-    if (!(corners >> corner & 1u)) continue;
+    const bool makes =
+        (w.any_at && (surface_corners<T, Trilinear>(s, p, w, cx, cy, cz) >> corner & 1u)) ||
+        (p.on_samples.cap && w.any_missing && cap_has<T, Trilinear>(s, p, w, cx, cy, cz, corner));
+    if (!makes) continue;
     for (int axis = 0; axis < 3; ++axis) first[axis] = other[axis];
   }
   return static_cast<std::uint32_t>(13 + first[0] + 3 * first[1] + 9 * first[2]);
 }
 
-/// Divides the used vertices of each row into the tile's own and those of others. A row a warp.
+/// Divides the used vertices of each row into the tile's own and those of others.
 template <int N, class T, bool Trilinear>
 __device__ inline void find_owners(const TileShared& s, const TileParams& p, SampleWork& w) {
   SampleTable& table = p.on_samples.tables[s.tile.slot];
-  const auto lane = static_cast<int>(lane_id());
-  for (auto row = static_cast<int>(warp_id()); row < kRowsOfTile; row += BlockConfig<N>::kWarps) {
+  for (auto row = static_cast<int>(own_thread()); row < kRowsOfTile; row += N) {
     const auto z = static_cast<int>(z_of_row(static_cast<std::uint32_t>(row))), y = row - 33 * z;
     const bool on_plane = y == 0 || y == 32 || z == 0 || z == 32;
     const unsigned long long used = w.used[row];
     const unsigned long long asked = p.unwelded ? 0 : on_plane ? used : used & (1ull << 32 | 1u);
-    unsigned long long own = used;
-    // Whether another tile makes the vertex on sample x; notes which.
-    const auto is_of_other = [&](bool is_asked, int x) {
-      const std::uint32_t owner = is_asked ? owner_of<T, Trilinear>(s, p, w, x, y, z) : 13;
-      if (owner == 13) return false;
-      w.owners[33 * row + x] = static_cast<std::uint8_t>(owner);
-      atomicOr(&w.other_owners, 1u << owner);
-      return true;
-    };
-    if (asked != 0) {
-      own &= ~static_cast<unsigned long long>(
-          __ballot_sync(kFullMask, is_of_other((asked >> lane & 1u) != 0, lane)));
-      const bool last = is_of_other(lane == 0 && (asked >> 32 & 1u) != 0, 32);
-      if (__any_sync(kFullMask, last)) own &= ~(1ull << 32);
-    }
-    if (lane > 0) continue;
-    table.own[row] = own;
-    table.before[row] = static_cast<std::uint16_t>(popc_64(own));
+    table.own[row] = used;
+    w.asked[row] = asked;
+    w.asked_before[row] = popc_64(asked);
   }
+  __syncthreads();
+  if (warp_id() == 0) {
+    const std::uint32_t all = sum_rows(w.asked_before);
+    if (lane_id() == 0) w.all_asked = all;
+  }
+  __syncthreads();
+  for_each_bit<N>(w.asked, w.asked_before, w.all_asked,
+                  [&](std::uint32_t, bool is_asked, int row, int x) {
+                    if (!is_asked) return;
+                    const auto z = static_cast<int>(z_of_row(static_cast<std::uint32_t>(row)));
+                    const std::uint32_t owner = owner_of<T, Trilinear>(s, p, w, x, row - 33 * z, z);
+                    if (owner == 13) return;
+                    w.owners[33 * row + x] = static_cast<std::uint8_t>(owner);
+                    atomicOr(&w.other_owners, 1u << owner);
+                    atomicAnd(&table.own[row], ~(1ull << x));
+                  });
+  __syncthreads();
+  for (auto row = static_cast<int>(own_thread()); row < kRowsOfTile; row += N)
+    table.before[row] = static_cast<std::uint16_t>(popc_64(table.own[row]));
 }
 
 /// Between find_samples() and count_tile(), and after find_patched() where that is called.

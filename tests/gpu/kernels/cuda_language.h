@@ -17,7 +17,6 @@
 #define __device__
 #define __host__
 #define __shared__ thread_local
-#define __constant__
 #define __grid_constant__
 #define __launch_bounds__(...)
 #define __align__(bytes) __attribute__((aligned(bytes)))
@@ -97,6 +96,11 @@ T atomicAdd(T* to, std::type_identity_t<T> value) {
 template <class T>
 T atomicOr(T* to, std::type_identity_t<T> value) {
   return std::atomic_ref(*to).fetch_or(value, std::memory_order_relaxed);
+}
+
+template <class T>
+T atomicAnd(T* to, std::type_identity_t<T> value) {
+  return std::atomic_ref(*to).fetch_and(value, std::memory_order_relaxed);
 }
 
 template <class T>
