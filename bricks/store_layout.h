@@ -10,6 +10,7 @@
 #include <isobrick/downsampling.h>
 #include <isobrick/image_metadata.h>
 #include <isobrick/level_info.h>
+#include <isobrick/sample_value.h>
 #include "bricks/zarr/array_metadata.h"
 #include "bricks/zarr/codec.h"
 
@@ -23,7 +24,7 @@ struct StoreLayout {
   OmeVersion ome = OmeVersion::v05;                ///< in 0.4 every shard is one brick
   BrickCodec codec = BrickCodec::zstd;
   int zstd_level = 3;
-  double fill_value = 0;
+  SampleValue fill_value;
   bool may_have_nan = false;
   std::string name;
   std::string grid_class;            ///< as OpenVDB calls it, or empty

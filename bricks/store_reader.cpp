@@ -38,13 +38,16 @@ void StoreReader::Impl::open(const Selection& selection) {
     for (std::size_t i = 0; i < levels.size(); ++i)
       open_ranges(static_cast<int>(i), ranges->levels[i]);
   }
-  info.type = info.levels[0].lattice.type;
+  info.type = info.stored_type = info.levels[0].lattice.type;
   info.grid_class = image.grid_class;
   info.grid_name = image.grid_name;
   info.labels = image.labels;
   info.fill_value = levels[0].metadata.fill_value;
   info.codec = levels[0].metadata.codecs.name();
   info.may_have_nan = is_floating(info.type) && may_have_nan.value_or(true);
+  surface_info = info;
+  surface_info.type = surface_type(info.type);
+  for (LevelInfo& level : surface_info.levels) level.lattice.type = surface_info.type;
 }
 
 // The ranges of the image as it is now: if its metadata was changed since, they are of another.
@@ -128,14 +131,21 @@ StoreReader::StoreReader(const std::filesystem::path& path, const Selection& sel
     : StoreReader(open_storage(path), selection) {}
 
 StoreReader::StoreReader(std::shared_ptr<const Storage> storage, const Selection& selection)
-    : impl_(std::make_unique<Impl>()) {
+    : impl_(std::make_shared<Impl>()) {
   impl_->storage = std::move(storage);
   impl_->open(selection);
 }
 
 StoreReader::~StoreReader() = default;
 
-const StoreInfo& StoreReader::info() const { return impl_->info; }
+StoreReader::StoreReader(std::shared_ptr<Impl> impl, bool is_native)
+    : impl_(std::move(impl)), is_native_(is_native) {}
+
+StoreReader StoreReader::native() const { return {impl_, true}; }
+
+const StoreInfo& StoreReader::info() const {
+  return is_native_ ? impl_->info : impl_->surface_info;
+}
 
 const std::shared_ptr<const Storage>& StoreReader::storage() const { return impl_->storage; }
 
@@ -154,11 +164,14 @@ std::string StoreReader::key_of(int level, Int3 b) const {
 bool StoreReader::read_brick(int level, Int3 b, std::byte* out) const {
   const auto place = impl_->find(level, b);
   if (!place) return false;
-  impl_->check_content(level, b, *place, impl_->read(level, b, *place, out));
+  impl_->check_content(level, b, *place, impl_->read(level, b, *place, is_native_, out));
   return true;
 }
 
-bool StoreReader::is_packed(int level) const { return impl_->at(level).metadata.codecs.packed; }
+bool StoreReader::is_packed(int level) const {
+  const ArrayMetadata& array = impl_->at(level).metadata;
+  return array.codecs.packed && (is_native_ || !is_wide_integer(array.type));
+}
 
 std::optional<std::size_t> StoreReader::read_packed(int level, Int3 b,
                                                     std::span<std::byte> out) const {
@@ -171,7 +184,7 @@ std::optional<std::uint32_t> StoreReader::read_brick_unchecked(int level, Int3 b
                                                                std::byte* out) const {
   const auto place = impl_->find_unchecked(level, b);
   if (!place) return std::nullopt;
-  return impl_->read(level, b, *place, out);
+  return impl_->read(level, b, *place, is_native_, out);
 }
 
 void StoreReader::will_need(int level, Int3 b) const {

@@ -53,8 +53,8 @@ struct StoreReader::Impl {
   void check_level(int level) const;
   void check_brick(int level, Int3 b) const;
   [[noreturn]] void damaged(int level, Int3 b, const Place& place, const std::string& what) const;
-  void widen_brick(int level, Int3 b, const Place& place, const std::byte* stored,
-                   std::byte* out) const;
+  void widen_brick(int level, const std::byte* stored, std::byte* out) const;
+  void make_surface_brick(int level, Int3 b, const Place& place, std::byte* out) const;
   Int3 shard_of(int level, Int3 b) const;
   std::string shard_key(int level, Int3 s) const;
   [[noreturn]] void missing_shard(int level, Int3 s, const char* why) const;
@@ -65,7 +65,7 @@ struct StoreReader::Impl {
   std::optional<Place> find_unchecked(int level, Int3 b);
   std::optional<Place> find(int level, Int3 b);
   void check_content(int level, Int3 b, const Place& place, std::uint32_t checksum);
-  std::uint32_t read(int level, Int3 b, const Place& place, std::byte* out);
+  std::uint32_t read(int level, Int3 b, const Place& place, bool is_native, std::byte* out);
   std::size_t read_packed(int level, Int3 b, const Place& place, std::span<std::byte> out);
   Clock::time_point read_encoded(const Place& place, std::span<std::byte> to);
   RangeTable ranges(int level, Box3 box, bool blocks);
@@ -79,7 +79,8 @@ struct StoreReader::Impl {
   }
 
   std::shared_ptr<const Storage> storage;
-  StoreInfo info;
+  StoreInfo info;          // of native()
+  StoreInfo surface_info;  // with the types that surfaces are made of
   VolumeChoice volume_choice;
   std::vector<Level> levels;
   std::atomic<std::uint64_t> bytes_read = 0;

@@ -329,11 +329,15 @@ void StoreWriter::finish_shard(int level, Int3 s) {
 }
 
 void StoreWriter::put_brick_ranges(int level, Box3 box, std::span<const std::byte> pairs) {
-  impl_->level(level).brick_ranges->put(box, pairs);
+  Impl::Level& l = impl_->level(level);
+  std::vector<std::byte> room;
+  l.brick_ranges->put(box, stored_pairs(l.lattice.type, pairs, room));
 }
 
 void StoreWriter::put_block_ranges(int level, Box3 box, std::span<const std::byte> pairs) {
-  impl_->level(level).block_ranges->put(box, pairs);
+  Impl::Level& l = impl_->level(level);
+  std::vector<std::byte> room;
+  l.block_ranges->put(box, stored_pairs(l.lattice.type, pairs, room));
 }
 
 void StoreWriter::copy_ranges(int level, const StoreReader& store,

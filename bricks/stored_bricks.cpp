@@ -46,11 +46,16 @@ void StoreReader::Impl::damaged(int level, Int3 b, const Place& place,
                                 b.y, b.z, place.object->name(), place.offset, place.size, what));
 }
 
-void StoreReader::Impl::widen_brick(int level, Int3 b, const Place& place, const std::byte* stored,
-                                    std::byte* out) const {
+void StoreReader::Impl::widen_brick(int level, const std::byte* stored, std::byte* out) const {
+  widen(*at(level).metadata.wide, stored, out,
+        static_cast<std::size_t>(volume(lattice(level).brick)));
+}
+
+void StoreReader::Impl::make_surface_brick(int level, Int3 b, const Place& place,
+                                           std::byte* out) const {
   try {
-    widen(*at(level).metadata.wide, stored, out,
-          static_cast<std::size_t>(volume(lattice(level).brick)));
+    make_surface_samples(lattice(level).type, out,
+                         static_cast<std::size_t>(volume(lattice(level).brick)));
   } catch (const Error& e) {
     throw Error(fmt::format("level {}, brick ({}, {}, {}): '{}': {}", level, b.x, b.y, b.z,
                             place.object->name(), e.what()));
@@ -208,7 +213,8 @@ std::size_t StoreReader::Impl::read_packed(int level, Int3 b, const Place& place
 }
 
 /// The checksum of the brick that is read.
-std::uint32_t StoreReader::Impl::read(int level, Int3 b, const Place& place, std::byte* out) {
+std::uint32_t StoreReader::Impl::read(int level, Int3 b, const Place& place, bool is_native,
+                                      std::byte* out) {
   const VolumePlace& volumes = at(level).place;
   const ArrayMetadata& array = at(level).metadata;
   const auto samples = static_cast<std::size_t>(volume(lattice(level).brick));
@@ -236,9 +242,10 @@ std::uint32_t StoreReader::Impl::read(int level, Int3 b, const Place& place, std
   const std::byte* from =
       volumes.chunk_volumes > 1 ? several.data() + volumes.in_chunk * stored : at_end;
   if (array.wide)
-    widen_brick(level, b, place, from, out);
+    widen_brick(level, from, out);
   else if (from != out)
     std::copy_n(from, stored, out);
+  if (!is_native) make_surface_brick(level, b, place, out);
   return brick_checksum(array.codecs, encoded);
 }
 

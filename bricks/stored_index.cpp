@@ -63,7 +63,8 @@ StoredIndex::StoredIndex(const StoreReader& store, int level, const std::string&
     throw Error(fmt::format("level {} has no {} index: there is no {}", level, kind, where));
   layout_ = parse_index_layout(*text, where);
   const Lattice& lattice = store.info().levels.at(static_cast<std::size_t>(level)).lattice;
-  if (layout_.kind != kind || layout_.type != lattice.type || layout_.extent != lattice.extent)
+  if (layout_.kind != kind || layout_.type != surface_type(lattice.type) ||
+      layout_.extent != lattice.extent)
     throw DamageError(fmt::format("{}: kind, type or shape are not those of level {}'s {} index",
                                   where, level, kind));
   if (layout_.ranges_crc32c !=

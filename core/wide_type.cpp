@@ -21,13 +21,13 @@ void widen_each(const std::byte* stored, std::byte* samples, std::size_t count, 
 }
 
 template <class From>
-double exact_double(From value) {
+double double_of(From value) {
   const auto as_double = static_cast<double>(value);
   // 2⁶⁴ and 2⁶³, which the largest integers round to, are none of the type.
   constexpr double end = std::is_signed_v<From> ? 0x1p63 : 0x1p64;
   if (!(as_double < end) || static_cast<From>(as_double) != value)
     throw Error("the value " + std::to_string(value) +
-                " is no float64 exactly, as which 64-bit integers are read");
+                " is no float64 exactly, as which surfaces read 64-bit integers");
   return as_double;
 }
 
@@ -46,16 +46,22 @@ float half_to_float(std::uint16_t bits) {
 
 void widen(WideType type, const std::byte* stored, std::byte* samples, std::size_t count) {
   switch (type) {
-    case WideType::u64:
-      return widen_each<std::uint64_t, double>(stored, samples, count, exact_double<std::uint64_t>);
-    case WideType::i64:
-      return widen_each<std::int64_t, double>(stored, samples, count, exact_double<std::int64_t>);
     case WideType::f16:
       return widen_each<std::uint16_t, float>(stored, samples, count, half_to_float);
     case WideType::boolean:
       return widen_each<std::uint8_t, std::uint8_t>(
           stored, samples, count, [](std::uint8_t v) { return static_cast<std::uint8_t>(v != 0); });
   }
+}
+
+double exact_double(std::uint64_t value) { return double_of(value); }
+double exact_double(std::int64_t value) { return double_of(value); }
+
+void make_surface_samples(ScalarType type, std::byte* samples, std::size_t count) {
+  if (type == ScalarType::u64)
+    widen_each<std::uint64_t, double>(samples, samples, count, double_of<std::uint64_t>);
+  else if (type == ScalarType::i64)
+    widen_each<std::int64_t, double>(samples, samples, count, double_of<std::int64_t>);
 }
 
 }  // namespace isobrick

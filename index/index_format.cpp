@@ -62,7 +62,7 @@ IndexHeader read_header(std::span<const std::byte> bytes) {
   require(std::memcmp(head, &magic, sizeof magic) == 0, "no index begins like this");
   require(head[4] == IndexHeader::kVersion, "of a version that this program does not know");
   require(head[5] < std::size(kIndexKinds), "of an unknown kind");
-  require(head[6] < std::size(kScalarTypes), "of an unknown sample type");
+  require(head[6] < std::size(kSurfaceTypes), "of an unknown sample type");
   require(head[7] == 0, "reserved bytes are not zero");
   std::memcpy(&header, bytes.data(), sizeof header);
   require(header.reserved1 == 0, "reserved bytes are not zero");

@@ -73,7 +73,7 @@ bool merge(const RowBundle& bundle, T* lo, T* hi) {
 }
 
 bool merge_of_type(ScalarType type, const RowBundle& bundle, void* lo, void* hi) {
-  return visit_scalar(type, [&](auto tag) {
+  return visit_sample(type, [&](auto tag) {
     using T = typename decltype(tag)::type;
     return merge(bundle, static_cast<T*>(lo), static_cast<T*>(hi));
   });

@@ -124,7 +124,7 @@ void look_up_words(std::span<const std::byte> values, std::span<const std::byte>
 }  // namespace
 
 std::optional<Palette> find_palette(ScalarType type, std::span<const std::byte> samples) {
-  return visit_scalar(type, [&](auto tag) -> std::optional<Palette> {
+  return visit_sample(type, [&](auto tag) -> std::optional<Palette> {
     using T = typename decltype(tag)::type;
     if constexpr (sizeof(T) == 1)
       return std::nullopt;

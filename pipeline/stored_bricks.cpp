@@ -1,5 +1,7 @@
 #include "pipeline/stored_bricks.h"
 
+#include <cmath>
+
 namespace isobrick::inline v0 {
 
 void for_each_range_file(Box3 bricks, const std::function<void(Box3 part)>& f) {
@@ -13,9 +15,10 @@ std::uint64_t for_each_stored_brick(const StoreReader& store, int level, Box3 bo
                                     Progress& progress, const std::function<void(Int3 brick)>& f) {
   const StoreInfo& info = store.info();
   const Lattice& lattice = info.levels[static_cast<std::size_t>(level)].lattice;
-  // Ranges include neither NaN nor the signs of zeros.
+  // Ranges include neither NaN nor the signs of zeros, and round 64-bit integers.
   const bool by_ranges = store.has_ranges(level) && !info.may_have_nan &&
-                         (!is_floating(lattice.type) || info.fill_value != 0);
+                         (!is_floating(lattice.type) || info.fill_value != 0) &&
+                         (!is_wide_integer(info.stored_type) || std::abs(info.fill_value) < 0x1p53);
   std::uint64_t looked_up = 0, passed = 0;
   const auto advance = [&] {
     progress.advance(passed * lattice.brick_bytes());

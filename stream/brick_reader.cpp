@@ -6,6 +6,7 @@
 #include <limits>
 
 #include <isobrick/error.h>
+#include "core/surface_range.h"
 
 namespace isobrick::inline v0 {
 namespace {
@@ -53,8 +54,7 @@ template <class T>
   ValueRange<T> range;
   for (std::size_t i = 0; i < Lanes<T>::kCount; ++i)
     range.include(ValueRange<T>{lanes.lo[i], lanes.hi[i]});
-  if (range.empty()) return {};
-  return {static_cast<double>(range.lo), static_cast<double>(range.hi)};
+  return surface_range(range);
 }
 
 #ifdef __x86_64__
@@ -122,7 +122,7 @@ void BrickReader::check(Int3 brick, const std::byte* samples) const {
   const ValueRange<double> stored = stored_range(brick);
   ValueRange<double> found;
   if (samples)
-    found = visit_scalar(lattice_.type, [&](auto tag) {
+    found = visit_sample(lattice_.type, [&](auto tag) {
       using T = typename decltype(tag)::type;
       const Int3 extent = min(lattice_.brick, lattice_.extent - brick * lattice_.brick);
       return range_of_fast(reinterpret_cast<const T*>(samples), lattice_.brick, extent);

@@ -8,7 +8,7 @@ namespace isobrick::inline v0 {
 namespace {
 
 template <class T>
-void gather_from_bricks(const Lattice& lattice, const BrickLookup& bricks, double fill, Index reach,
+void gather_from_bricks(const Lattice& lattice, const BrickLookup& bricks, T fill, Index reach,
                         const TileWork& work, const TileBlock& block) {
   constexpr auto size = static_cast<Index>(sizeof(T));
   const RowStrides brick_strides{lattice.brick.x * size, lattice.brick.x * lattice.brick.y * size};
@@ -27,7 +27,7 @@ void gather_from_bricks(const Lattice& lattice, const BrickLookup& bricks, doubl
       else
         for (Index z = 0; z < n.z; ++z)
           for (Index y = 0; y < n.y; ++y)
-            std::fill_n(to + z * block.plane + y * block.row, n.x, static_cast<T>(fill));
+            std::fill_n(to + z * block.plane + y * block.row, n.x, fill);
     });
   });
 }
@@ -35,8 +35,9 @@ void gather_from_bricks(const Lattice& lattice, const BrickLookup& bricks, doubl
 }  // namespace
 
 void BrickSamples::gather(const TileWork& work, Index reach, const TileBlock& block) const {
-  visit_scalar(lattice_.type, [&](auto tag) {
-    gather_from_bricks<typename decltype(tag)::type>(lattice_, bricks_, fill_, reach, work, block);
+  visit_sample(lattice_.type, [&](auto tag) {
+    using T = typename decltype(tag)::type;
+    gather_from_bricks<T>(lattice_, bricks_, fill_.as<T>(), reach, work, block);
   });
 }
 

@@ -3,6 +3,7 @@
 #include <cstddef>
 
 #include <isobrick/lattice.h>
+#include <isobrick/sample_value.h>
 #include "core/tile.h"
 
 namespace isobrick::inline v0 {
@@ -27,14 +28,14 @@ class TileSamples {
 class BrickSamples final : public TileSamples {
  public:
   /// The lattice and the bricks must outlive it. Absent bricks hold `fill`.
-  BrickSamples(const Lattice& lattice, const BrickLookup& bricks, double fill)
+  BrickSamples(const Lattice& lattice, const BrickLookup& bricks, const SampleValue& fill)
       : lattice_(lattice), bricks_(bricks), fill_(fill) {}
   void gather(const TileWork& work, Index reach, const TileBlock& block) const override;
 
  private:
   const Lattice& lattice_;
   const BrickLookup& bricks_;
-  double fill_;
+  SampleValue fill_;
 };
 
 }  // namespace isobrick

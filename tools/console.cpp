@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <cmath>
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
@@ -99,6 +100,13 @@ void print_out_of_memory(std::string_view command) noexcept {
 
 nlohmann::ordered_json to_json(Int3 v) { return {v.x, v.y, v.z}; }
 nlohmann::ordered_json to_json(Vec3d v) { return {v.x, v.y, v.z}; }
+
+nlohmann::ordered_json to_json(const SampleValue& value) {
+  const double number = value;
+  if (value == number || std::isnan(number)) return number;
+  if (const auto integer = value.as_signed()) return *integer;
+  return value.as_unsigned().value_or(0);
+}
 
 std::uint64_t peak_resident_bytes() {
   std::ifstream status("/proc/self/status");

@@ -6,6 +6,7 @@
 
 #include <nlohmann/json_fwd.hpp>
 
+#include <isobrick/sample_value.h>
 #include <isobrick/vec.h>
 #include "tools/progress.h"
 
@@ -65,6 +66,8 @@ void print_out_of_memory(std::string_view command) noexcept;
 
 nlohmann::ordered_json to_json(Int3 v);
 nlohmann::ordered_json to_json(Vec3d v);
+/// A number with a fraction where that is exact, else an integer.
+nlohmann::ordered_json to_json(const SampleValue& value);
 
 /// The most memory that this process ever held (VmHWM), 0 when unknown.
 std::uint64_t peak_resident_bytes();

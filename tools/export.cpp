@@ -117,7 +117,9 @@ int run_export(const ExportArguments& arguments, Console& console) {
     if (const std::string why = why_out_of_range(store, options.level, *options.isovalue);
         !why.empty())
       console.note(why);
-  const ScalarType type = store.info().type;
+  // OpenVDB has no 64-bit integers.
+  const ScalarType type =
+      options.format == ExportFormat::vdb ? store.info().type : store.info().stored_type;
   nlohmann::ordered_json object{{"command", "export"},
                                 {"input", arguments.input.path},
                                 {"output", out},

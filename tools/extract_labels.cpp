@@ -2,6 +2,7 @@
 
 #include <array>
 #include <charconv>
+#include <limits>
 #include <utility>
 
 #include <fmt/format.h>
@@ -24,6 +25,9 @@ using nlohmann::ordered_json;
 std::int64_t parse_label(std::string_view text) {
   std::int64_t label = 0;
   const auto [end, failure] = std::from_chars(text.data(), text.data() + text.size(), label);
+  if (failure == std::errc::result_out_of_range && end == text.data() + text.size())
+    throw UsageError(fmt::format("'{}' is no label of a mesh; the largest is {}", text,
+                                 std::numeric_limits<std::int64_t>::max()));
   if (text.empty() || failure != std::errc() || end != text.data() + text.size())
     throw UsageError(fmt::format(
         "'{}' is no label; --labels takes all, or whole numbers and ranges such as 3,7,10:20",

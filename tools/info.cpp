@@ -222,7 +222,7 @@ ordered_json json_of(const std::string& path, const StoreInfo& info, const Store
       {"input", path},
       {"format", info.ours ? "store" : "Zarr"},
       {"extent", to_json(finest.lattice.extent)},
-      {"type", zarr_name(info.type)},
+      {"type", zarr_name(info.stored_type)},
       {"spacing", to_json(finest.transform.spacing)},
       {"origin", to_json(finest.transform.origin)},
       {"direction", finest.transform.direction},
@@ -231,7 +231,7 @@ ordered_json json_of(const std::string& path, const StoreInfo& info, const Store
       {"codec_sample", codec_sample_json(facts.codec_sample)},
       {"codec_advice",
        facts.codec_advice.empty() ? ordered_json(nullptr) : ordered_json(facts.codec_advice)},
-      {"fill_value", info.fill_value},
+      {"fill_value", to_json(info.fill_value)},
       {"grid_class", info.grid_class},
       {"grid_name", info.grid_name},
       {"labels", labels_json(info.labels)},
@@ -324,8 +324,9 @@ std::string histogram_text(const StoreInfo& info, const StoreFacts& facts) {
 
 std::string text_of(const std::string& path, const StoreInfo& info, const StoreFacts& facts) {
   std::string text = fmt::format("{:<13}{}\n", info.ours ? "store" : "image", path);
-  text += fmt::format("extent       {} samples of {}\n",
-                      human_extent(info.levels.front().lattice.extent), zarr_name(info.type));
+  text +=
+      fmt::format("extent       {} samples of {}\n",
+                  human_extent(info.levels.front().lattice.extent), zarr_name(info.stored_type));
   text += place_text(info.levels.front().transform);
   if (!info.grid_name.empty()) text += fmt::format("grid         {}\n", info.grid_name);
   if (!info.grid_class.empty()) text += fmt::format("grid class   {}\n", info.grid_class);

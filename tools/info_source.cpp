@@ -40,7 +40,7 @@ nlohmann::ordered_json json_of(const InputArguments& input, const VolumeInfo& in
           {"codec", nullptr},
           {"codec_sample", nullptr},
           {"codec_advice", nullptr},
-          {"fill_value", info.fill_value},
+          {"fill_value", to_json(info.fill_value)},
           {"grid_class", info.grid_class},
           {"grid_name", info.grid_name},
           {"labels", labels_json(info.labels)},

@@ -106,7 +106,7 @@ void add_dims(CLI::App* app, std::optional<Int3>& dims, bool required) {
 
 void add_type(CLI::App* app, std::optional<ScalarType>& type, bool required) {
   add_parsed(app, type, parse_type,
-             {"--type", "u8|i8|u16|i16|u32|i32|f32|f64", "Type of a sample", "", required});
+             {"--type", "u8|i8|u16|i16|u32|i32|f32|f64|u64|i64", "Type of a sample", "", required});
 }
 
 void add_level(CLI::App* app, int& level) {

@@ -175,8 +175,8 @@ Vec3f parse_colour(std::string_view text) {
 
 ScalarType parse_type(std::string_view text) {
   if (const auto type = parse_scalar_type(text)) return *type;
-  throw UsageError(
-      fmt::format("unknown type '{}'; the types are u8, i8, u16, i16, u32, i32, f32, f64", text));
+  throw UsageError(fmt::format(
+      "unknown type '{}'; the types are u8, i8, u16, i16, u32, i32, f32, f64, u64, i64", text));
 }
 
 ByteOrder parse_byte_order(std::string_view text) {

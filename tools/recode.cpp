@@ -44,7 +44,7 @@ int run_recode(const RecodeArguments& arguments, Console& console) {
   const ConvertReport report = recode(store, out, arguments.options, console.progress());
   VolumeInfo volume;
   volume.extent = store.info().levels.front().lattice.extent;
-  volume.type = store.info().type;
+  volume.type = store.info().stored_type;
   report_conversion(console, "recode", arguments.in, out, volume, report, notes_of(store));
   return 0;
 }

@@ -3,6 +3,7 @@
 #include <cstring>
 
 #include "bricks/zarr/codec.h"
+#include "core/surface_range.h"
 
 namespace isobrick::inline v0 {
 namespace {
@@ -41,7 +42,7 @@ ArrayMetadata range_array_metadata(Int3 items, ScalarType type) {
   ArrayMetadata metadata = checksum_array_metadata(items);
   metadata.shape.push_back(2);
   metadata.chunk.push_back(2);
-  metadata.type = type;
+  metadata.type = surface_type(type);
   metadata.dimension_names.emplace_back("bound");
   return metadata;
 }
@@ -55,6 +56,23 @@ ArrayMetadata checksum_array_metadata(Int3 items) {
   metadata.codecs = CodecChain::ours(kRangeZstdLevel);
   metadata.dimension_names = {"z", "y", "x"};
   return metadata;
+}
+
+std::span<const std::byte> stored_pairs(ScalarType type, std::span<const std::byte> pairs,
+                                        std::vector<std::byte>& room) {
+  if (!is_wide_integer(type)) return pairs;
+  room.resize(pairs.size());
+  visit_sample(type, [&](auto tag) {
+    using T = typename decltype(tag)::type;
+    for (std::size_t at = 0; at < pairs.size(); at += sizeof(ValueRange<T>)) {
+      ValueRange<T> range;
+      std::memcpy(&range, pairs.data() + at, sizeof range);
+      const ValueRange<double> rounded = surface_range(range);
+      if constexpr (sizeof range == sizeof rounded)
+        std::memcpy(room.data() + at, &rounded, sizeof rounded);
+    }
+  });
+  return room;
 }
 
 std::size_t item_bytes(const ArrayMetadata& array) {
@@ -84,7 +102,7 @@ void pack_items(std::size_t bytes_of_item, Box3 box, std::span<const std::byte> 
 
 void unpack_ranges(ScalarType type, std::span<const std::byte> decoded, const ChunkPlace& place,
                    Box3 part, RangeTable& table) {
-  visit_scalar(type, [&](auto tag) {
+  visit_scalar(surface_type(type), [&](auto tag) {
     using T = typename decltype(tag)::type;
     for_each_row(table.box, place, part, 2 * sizeof(T),
                  [&](std::size_t from, std::size_t item, std::size_t count) {

@@ -22,11 +22,17 @@ inline constexpr Int3 kRangeChunkCube{kRangeChunkEdge, kRangeChunkEdge, kRangeCh
 /// docs/reference/store_format.md has the rule.
 Int3 range_chunk_extent(Int3 items);
 
-/// The array [z, y, x, 2] of the ranges of so many items: pairs (lo, hi) of the level's type.
+/// The array [z, y, x, 2] of the ranges of so many items: pairs (lo, hi) of the
+/// surface_type() of the level's type.
 ArrayMetadata range_array_metadata(Int3 items, ScalarType type);
 
 /// The array [z, y, x] of the checksums of so many bricks.
 ArrayMetadata checksum_array_metadata(Int3 items);
+
+/// Ranges of samples of a type as the array keeps them, in its surface_type(): `pairs` as they are,
+/// or those of 64-bit integers in `room`.
+std::span<const std::byte> stored_pairs(ScalarType type, std::span<const std::byte> pairs,
+                                        std::vector<std::byte>& room);
 
 /// Bytes of an item of such an array.
 std::size_t item_bytes(const ArrayMetadata& array);

@@ -21,8 +21,7 @@ constexpr int kZstdLevel = 3;
 ArrayMetadata array_of(Index bins) {
   ArrayMetadata array;
   array.shape = array.chunk = {std::max<Index>(bins, 1)};
-  array.wide = WideType::u64;
-  array.type = widened(WideType::u64);
+  array.type = ScalarType::u64;
   array.codecs = CodecChain::ours(kZstdLevel);
   array.dimension_names = {"bin"};
   return array;
@@ -64,7 +63,7 @@ SampleCounts read_histogram(const Storage& storage, const std::string& folder,
   const ArrayMetadata expected = array_of(stored.bins.count);
   const ArrayMetadata array = parse_array_metadata(*text, where);
   if (array.shape != expected.shape || array.chunk != expected.chunk ||
-      array.wide != expected.wide || array.sharding)
+      array.type != expected.type || array.sharding)
     throw DamageError(where + ": is not the array of the store's histogram");
   const std::string key = join_key(folder, chunk_name(array)), file = quoted(storage, key);
   std::vector<std::uint64_t> values(static_cast<std::size_t>(array.shape.front()));

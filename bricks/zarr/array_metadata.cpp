@@ -40,8 +40,13 @@ Json codec_list(const CodecChain& chain) {
   return list;
 }
 
-Json fill_value_json(ScalarType type, double value) {
-  if (!is_floating(type)) return static_cast<Index>(value);
+Json fill_value_json(ScalarType type, const SampleValue& fill) {
+  if (!is_floating(type)) {
+    if (const auto value = fill.as_signed()) return *value;
+    if (const auto value = fill.as_unsigned()) return *value;
+    throw Error(fmt::format("fill value {} is no {}", fill.text(), zarr_name(type)));
+  }
+  const double value = fill;
   if (std::isnan(value)) return "NaN";
   if (std::isinf(value)) return value > 0 ? "Infinity" : "-Infinity";
   return value;
@@ -58,9 +63,17 @@ double bits_to_double(const JsonReader& json, ScalarType type, const std::string
   return static_cast<double>(std::bit_cast<float>(static_cast<std::uint32_t>(bits)));
 }
 
-double parse_fill_value(const JsonReader& json, ScalarType type) {
-  double value = 0;
-  if (is_floating(type) && json.raw().is_string()) {
+SampleValue parse_integer(const JsonReader& json) {
+  const nlohmann::json& raw = json.raw();
+  if (raw.is_number_unsigned()) return raw.get<std::uint64_t>();
+  if (raw.is_number_integer()) return raw.get<std::int64_t>();
+  const double value = json.number();
+  if (std::trunc(value) != value) json.damaged(fmt::format("{} is no integer", value));
+  return value;
+}
+
+double parse_floating_fill_value(const JsonReader& json, ScalarType type) {
+  if (json.raw().is_string()) {
     const std::string text = json.string();
     constexpr double infinity = std::numeric_limits<double>::infinity();
     if (text == "NaN") return std::numeric_limits<double>::quiet_NaN();
@@ -69,62 +82,29 @@ double parse_fill_value(const JsonReader& json, ScalarType type) {
     if (text.starts_with("0x")) return bits_to_double(json, type, text);
     json.damaged(fmt::format("'{}' is no {}", text, zarr_name(type)));
   }
-  value = json.number();
-  if (type == ScalarType::f32) {
-    // Written as a decimal number; the sample is the nearest float.
-    if (std::abs(value) > static_cast<double>(std::numeric_limits<float>::max()))
-      json.damaged(fmt::format("{} is no float32", value));
-    return static_cast<double>(static_cast<float>(value));
-  }
+  const double value = json.number();
   if (type == ScalarType::f64) return value;
-  return visit_scalar(type, [&](auto tag) {
-    using T = typename decltype(tag)::type;
-    if (std::trunc(value) != value ||
-        value < static_cast<double>(std::numeric_limits<T>::lowest()) ||
-        value > static_cast<double>(std::numeric_limits<T>::max()))
-      json.damaged(fmt::format("{} is no {}", value, zarr_name(type)));
-    return value;
-  });
+  // Written as a decimal number; the sample is the nearest float.
+  if (std::abs(value) > static_cast<double>(std::numeric_limits<float>::max()))
+    json.damaged(fmt::format("{} is no float32", value));
+  return static_cast<double>(static_cast<float>(value));
 }
 
-// Integers that no double is are refused, as samples are.
-double parse_integer(const JsonReader& json) {
-  const nlohmann::json& raw = json.raw();
-  std::uint64_t bits = 0;
-  double value = 0;
-  try {
-    if (raw.is_number_unsigned()) {
-      bits = raw.get<std::uint64_t>();
-      widen(WideType::u64, reinterpret_cast<const std::byte*>(&bits),
-            reinterpret_cast<std::byte*>(&value), 1);
-    } else if (raw.is_number_integer()) {
-      bits = static_cast<std::uint64_t>(raw.get<std::int64_t>());
-      widen(WideType::i64, reinterpret_cast<const std::byte*>(&bits),
-            reinterpret_cast<std::byte*>(&value), 1);
-    } else {
-      value = json.number();
-      if (std::trunc(value) != value) json.damaged(fmt::format("{} is no integer", value));
-    }
-  } catch (const DamageError&) {
-    throw;
-  } catch (const Error& e) {
-    json.unsupported(e.what());
-  }
+SampleValue parse_fill_value(const JsonReader& json, ScalarType type) {
+  if (is_floating(type)) return parse_floating_fill_value(json, type);
+  const SampleValue value = parse_integer(json);
+  if (!is_sample(value, type))
+    json.damaged(fmt::format("{} is no {}", value.text(), zarr_name(type)));
   return value;
 }
 
-double parse_wide_fill_value(const JsonReader& json, WideType type) {
+SampleValue parse_wide_fill_value(const JsonReader& json, WideType type) {
   if (type == WideType::boolean)
     return (json.raw().is_boolean() ? json.boolean() : parse_integer(json) != 0) ? 1 : 0;
-  if (type != WideType::f16) {
-    const double value = parse_integer(json);
-    if (type == WideType::u64 && value < 0) json.damaged(fmt::format("{} is no uint64", value));
-    return value;
-  }
   if (json.raw().is_string() && json.string().starts_with("0x") && json.string().size() == 6)
     return static_cast<double>(half_to_float(
         static_cast<std::uint16_t>(bits_to_double(json, ScalarType::u16, json.string()))));
-  return parse_fill_value(json, ScalarType::f32);
+  return parse_floating_fill_value(json, ScalarType::f32);
 }
 
 std::optional<ScalarType> parse_own_type(std::string_view name) {

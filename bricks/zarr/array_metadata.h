@@ -6,6 +6,7 @@
 #include <string_view>
 #include <vector>
 
+#include <isobrick/sample_value.h>
 #include <isobrick/scalar.h>
 #include <isobrick/vec.h>
 #include "bricks/zarr/codec.h"
@@ -28,7 +29,7 @@ struct ArrayMetadata {
   std::vector<Index> chunk;  ///< of the regular grid: a shard, if there are shards
   ScalarType type = ScalarType::u8;
   std::optional<WideType> wide;  ///< what is stored, where that is none of our types
-  double fill_value = 0;
+  SampleValue fill_value;
   CodecChain codecs;  ///< of a chunk, or of a brick if there are shards
   std::optional<Sharding> sharding;
   bool key_prefix = true;  ///< keys begin with "c"

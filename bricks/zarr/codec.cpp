@@ -122,29 +122,22 @@ std::span<const std::byte> without_checksum(std::span<const std::byte> encoded) 
   return body;
 }
 
-std::uint64_t fill_bits(ScalarType type, double fill_value) {
-  return visit_scalar(type, [&](auto tag) {
+std::uint64_t fill_bits(ScalarType type, const SampleValue& fill_value) {
+  // Not a value of the type: metadata is checked before, so this is a caller's slip.
+  if (!is_sample(fill_value, type))
+    throw Error(fmt::format("fill value {} is no {}", fill_value.text(), zarr_name(type)));
+  return visit_sample(type, [&](auto tag) {
     using T = typename decltype(tag)::type;
-    T value{};
-    if constexpr (std::numeric_limits<T>::is_integer) {
-      // Not a value of the type: metadata is checked before, so this is a caller's slip.
-      if (!(fill_value >= static_cast<double>(std::numeric_limits<T>::lowest()) &&
-            fill_value <= static_cast<double>(std::numeric_limits<T>::max())) ||
-          std::trunc(fill_value) != fill_value)
-        throw Error(fmt::format("fill value {} is no {}", fill_value, zarr_name(type)));
-      value = static_cast<T>(fill_value);
-    } else if (std::isnan(fill_value)) {
-      value = std::numeric_limits<T>::quiet_NaN();
-    } else {
-      value = static_cast<T>(fill_value);
-    }
+    T value = fill_value.as<T>();
+    if constexpr (std::is_floating_point_v<T>)
+      if (std::isnan(value)) value = std::numeric_limits<T>::quiet_NaN();
     std::uint64_t bits = 0;
     std::memcpy(&bits, &value, sizeof value);
     return bits;
   });
 }
 
-bool all_fill(ScalarType type, std::span<const std::byte> samples, double fill_value) {
+bool all_fill(ScalarType type, std::span<const std::byte> samples, const SampleValue& fill_value) {
   const std::size_t size = size_of(type);
   if (samples.size() < size) return samples.empty();
   const std::uint64_t bits = fill_bits(type, fill_value);
@@ -154,12 +147,13 @@ bool all_fill(ScalarType type, std::span<const std::byte> samples, double fill_v
          std::memcmp(samples.data(), samples.data() + size, samples.size() - size) == 0;
 }
 
-void fill_box(ScalarType type, double fill_value, BoxSamples<std::byte> samples, Box3 part) {
+void fill_box(ScalarType type, const SampleValue& fill_value, BoxSamples<std::byte> samples,
+              Box3 part) {
   set_box(type, fill_bits(type, fill_value), samples, part);
 }
 
 void set_box(ScalarType type, std::uint64_t bits, BoxSamples<std::byte> samples, Box3 part) {
-  visit_scalar(type, [&](auto tag) {
+  visit_sample(type, [&](auto tag) {
     using T = typename decltype(tag)::type;
     T value;
     std::memcpy(&value, &bits, sizeof value);
@@ -170,7 +164,7 @@ void set_box(ScalarType type, std::uint64_t bits, BoxSamples<std::byte> samples,
   });
 }
 
-void pad_brick(const Lattice& lattice, Int3 b, double fill_value, std::byte* brick) {
+void pad_brick(const Lattice& lattice, Int3 b, const SampleValue& fill_value, std::byte* brick) {
   const Box3 full = lattice.full_brick_box(b), held = lattice.brick_box(b);
   for (int axis = 0; axis < 3; ++axis) {
     Box3 beyond = full;
@@ -208,7 +202,8 @@ std::vector<std::byte> encode_bytes(const CodecChain& chain, std::span<const std
 
 std::optional<std::vector<std::byte>> encode_brick(const Lattice& lattice,
                                                    std::span<const std::byte> samples,
-                                                   double fill_value, const CodecChain& chain) {
+                                                   const SampleValue& fill_value,
+                                                   const CodecChain& chain) {
   if (all_fill(lattice.type, samples, fill_value)) return std::nullopt;
   if (!chain.packed) return encode_bytes(chain, samples);
   std::vector<std::byte> packed = pack_brick(lattice.type, lattice.brick, samples);

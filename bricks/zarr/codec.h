@@ -9,6 +9,7 @@
 
 #include <isobrick/brick_codec.h>
 #include <isobrick/lattice.h>
+#include <isobrick/sample_value.h>
 #include "bricks/zarr/decompress.h"
 #include "core/copy_box.h"
 
@@ -48,26 +49,28 @@ inline constexpr std::uint64_t kMaxBrickBytes = std::uint64_t{1} << 31;
 
 /// The bytes of the fill value as a sample of `type`, native order; the first
 /// size_of(type) of the eight count. A NaN becomes the canonical quiet one.
-std::uint64_t fill_bits(ScalarType type, double fill_value);
+std::uint64_t fill_bits(ScalarType type, const SampleValue& fill_value);
 
 /// True when every sample equals the fill value, bit for bit.
-bool all_fill(ScalarType type, std::span<const std::byte> samples, double fill_value);
+bool all_fill(ScalarType type, std::span<const std::byte> samples, const SampleValue& fill_value);
 
 /// Sets the samples of `part`, which lies in the box, to the fill value.
-void fill_box(ScalarType type, double fill_value, BoxSamples<std::byte> samples, Box3 part);
+void fill_box(ScalarType type, const SampleValue& fill_value, BoxSamples<std::byte> samples,
+              Box3 part);
 
 /// Sets them to a sample of `bits`, as fill_bits() returns them.
 void set_box(ScalarType type, std::uint64_t bits, BoxSamples<std::byte> samples, Box3 part);
 
 /// Sets the samples of brick `b` that lie outside the volume to the fill value:
 /// what bricks at the border are padded with before they are encoded.
-void pad_brick(const Lattice& lattice, Int3 b, double fill_value, std::byte* brick);
+void pad_brick(const Lattice& lattice, Int3 b, const SampleValue& fill_value, std::byte* brick);
 
 /// Encodes a full brick (native byte order, already padded) as our stores keep
 /// it; nothing when all samples equal the fill value. Thread-safe.
 std::optional<std::vector<std::byte>> encode_brick(const Lattice& lattice,
                                                    std::span<const std::byte> samples,
-                                                   double fill_value, const CodecChain& chain);
+                                                   const SampleValue& fill_value,
+                                                   const CodecChain& chain);
 
 /// Bytes that one thread keeps to encode bricks of so many bytes.
 std::size_t encoder_memory(const CodecChain& chain, std::size_t brick_bytes);

@@ -1,10 +1,10 @@
 #include "bricks/zarr/label_metadata.h"
 
 #include <algorithm>
-#include <cmath>
 #include <map>
 #include <optional>
 
+#include <isobrick/sample_value.h>
 #include "bricks/storage/storage_keys.h"
 
 namespace isobrick::inline v0 {
@@ -12,14 +12,14 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr double kMaxLabel = 9007199254740992;  // 2⁵³
-
 /// The label that an entry of `colors` or `properties` is of.
 std::optional<std::int64_t> label_of(const JsonReader& entry) {
   if (!entry.has("label-value")) return std::nullopt;
-  const double value = entry.at("label-value").number();
-  if (!(std::abs(value) <= kMaxLabel) || value != std::trunc(value)) return std::nullopt;
-  return static_cast<std::int64_t>(value);
+  const JsonReader json = entry.at("label-value");
+  const nlohmann::json& raw = json.raw();
+  if (raw.is_number_unsigned()) return SampleValue(raw.get<std::uint64_t>()).as_signed();
+  if (raw.is_number_integer()) return raw.get<std::int64_t>();
+  return SampleValue(json.number()).as_signed();
 }
 
 /// Calls f(entry, label) for each entry of a list that may be missing.

@@ -25,10 +25,7 @@ NumpyType parse_dtype(const JsonReader& json) {
   };
   if (text.size() != 3 || std::string_view("<>|").find(text[0]) == std::string_view::npos) refuse();
   const int bytes = text[2] - '0';
-  for (const auto& [kind, type] : {std::pair("u8", WideType::u64),
-                                   {"i8", WideType::i64},
-                                   {"f2", WideType::f16},
-                                   {"b1", WideType::boolean}})
+  for (const auto& [kind, type] : {std::pair("f2", WideType::f16), {"b1", WideType::boolean}})
     if (text.substr(1) == kind) return {std::string(zarr_name(type)), text[0] == '>'};
   for (const ScalarType type : kScalarTypes) {
     const char kind = short_name(type)[0];

@@ -89,10 +89,10 @@ struct LabelReport {
 /// on the other labels that are chosen. Memory grows with the number of labels, by 400 bytes each
 /// at most, and not with the meshes, which wait in a scratch file.
 ///
-/// Samples must be whole numbers, at most 2⁵³. NaN has no label. Calls `visit` with the labels in
-/// about ascending order, after the pass. Throws UsageError for a level, region or range of labels
-/// that makes no sense, a label that is named and not there, and a budget too small; Error where a
-/// sample is no label.
+/// Samples must be whole numbers; of u64 those beyond 2⁶³ − 1 have no mesh and may not be chosen,
+/// floating-point ones are 2⁵³ at most. NaN has no label. Calls `visit` with the labels in about
+/// ascending order, after the pass. Throws UsageError for a level, region or range of labels that
+/// makes no sense, a label not there, a budget too small; Error where a sample is no label.
 ISOBRICK_API LabelReport extract_labels(const StoreReader& store, const LabelOptions& options,
                                         const LabelVisitor& visit,
                                         Progress& progress = no_progress());

@@ -14,6 +14,7 @@
 #include <isobrick/lattice.h>
 #include <isobrick/level_info.h>
 #include <isobrick/range_table.h>
+#include <isobrick/sample_value.h>
 #include <isobrick/selection.h>
 #include <isobrick/storage.h>
 
@@ -27,8 +28,10 @@ struct StoreInfo {
   std::string additions;
   Selection selection;               ///< as requested
   std::vector<LevelInfo> levels;     ///< the finest first
-  ScalarType type = ScalarType::u8;  ///< of the samples
-  double fill_value = 0;             ///< of absent bricks; exact for every type
+  ScalarType type = ScalarType::u8;  ///< of the samples as they are read
+  /// Of the samples as StoreReader::native() reads them: the same but for 64-bit integers.
+  ScalarType stored_type = ScalarType::u8;
+  SampleValue fill_value;  ///< of absent bricks; exact for every type
   std::string grid_class;  ///< of the OpenVDB grid that it came from ("level set"), or empty
   std::string grid_name;   ///< of that grid, or empty
   std::optional<LabelTable> labels;  ///< as VolumeInfo::labels
@@ -70,6 +73,9 @@ struct ISOBRICK_API BrickTimes {
 /// Reads a store, or an image or array that another program has written as Zarr
 /// version 2 or 3. Thread-safe after construction; keeps shard indices cached
 /// in bounded memory, never samples.
+///
+/// 64-bit integers are read as f64, which surfaces are made of; an integer that no f64 is throws
+/// Error. native() reads them as they are.
 class ISOBRICK_API StoreReader {
  public:
   /// Opens the store in a folder or in a zip, as open_storage() does.
@@ -79,6 +85,11 @@ class ISOBRICK_API StoreReader {
   /// when the selection leaves open which volume is meant, or means none.
   explicit StoreReader(std::shared_ptr<const Storage> storage, const Selection& selection = {});
   ~StoreReader();
+
+  /// The same store, whose 64-bit integers are read as they are: for labels and for copies. Ranges
+  /// stay f64 (surface_type()): the nearest one of an item that has one value, else those below
+  /// and above. Shares what is cached and counted.
+  StoreReader native() const;
 
   /// The metadata. Valid as long as the reader.
   const StoreInfo& info() const;
@@ -101,7 +112,8 @@ class ISOBRICK_API StoreReader {
   /// checksum; nullopt when it is absent.
   std::optional<std::uint32_t> read_brick_unchecked(int level, Int3 b, std::byte* out) const;
 
-  /// Whether the bricks of a level are packed (BrickCodec::packed).
+  /// Whether the bricks of a level are packed (BrickCodec::packed) samples of the type that this
+  /// reader gives.
   bool is_packed(int level) const;
   /// Reads and checks brick `b` of such a level as it is stored, without the checksum at its end,
   /// to the beginning of `out`, which has room for the checksum as well. How many bytes; nullopt
@@ -136,7 +148,10 @@ class ISOBRICK_API StoreReader {
 
  private:
   struct Impl;
-  std::unique_ptr<Impl> impl_;
+  StoreReader(std::shared_ptr<Impl> impl, bool is_native);
+
+  std::shared_ptr<Impl> impl_;
+  bool is_native_ = false;
 };
 
 }  // namespace isobrick

@@ -9,6 +9,7 @@
 
 #include <isobrick/api.h>
 #include <isobrick/label_properties.h>
+#include <isobrick/sample_value.h>
 #include <isobrick/scalar.h>
 #include <isobrick/transform.h>
 #include <isobrick/vec.h>
@@ -21,7 +22,7 @@ struct VolumeInfo {
   ScalarType type = ScalarType::u8;  ///< of the samples
   Transform transform;               ///< index space to world space
   std::string name;        ///< for messages and metadata: the path, "standard input", "gyroid"
-  double fill_value = 0;   ///< what absent bricks hold: the value of empty space
+  SampleValue fill_value;  ///< what absent bricks hold: the value of empty space
   std::string grid_class;  ///< what OpenVDB calls it: "level set", "fog volume", …; or empty
   std::string grid_name;   ///< of the OpenVDB grid that it is, or empty
   /// Of a label image: what is known of its labels, of some or of none. Nothing: it is no label

@@ -59,15 +59,13 @@ bool parse(std::string_view word, T& value) {
 
 class TextStream final : public ByteStream {
  public:
-  TextStream(std::unique_ptr<ByteStream> text, StoredType type)
+  TextStream(std::unique_ptr<ByteStream> text, ScalarType type)
       : text_(std::move(text)),
         type_(type),
         buffer_(std::make_unique_for_overwrite<char[]>(kBuffer)) {}
 
   std::size_t read(std::byte* out, std::size_t size) override {
-    if (type_.wide == WideType::i64) return read_as<std::int64_t>(out, size);
-    if (type_.wide == WideType::u64) return read_as<std::uint64_t>(out, size);
-    return visit_scalar(type_.type,
+    return visit_sample(type_,
                         [&](auto tag) { return read_as<typename decltype(tag)::type>(out, size); });
   }
 
@@ -75,9 +73,9 @@ class TextStream final : public ByteStream {
   /// A number takes a digit and a blank, the last one no blank.
   std::uint64_t max_bytes() const override {
     const std::uint64_t text = text_->max_bytes(), numbers = text / 2 + text % 2;
-    return numbers > std::numeric_limits<std::uint64_t>::max() / size_of(type_.type)
+    return numbers > std::numeric_limits<std::uint64_t>::max() / size_of(type_)
                ? std::numeric_limits<std::uint64_t>::max()
-               : numbers * size_of(type_.type);
+               : numbers * size_of(type_);
   }
   std::size_t memory() const override { return text_->memory() + kBuffer; }
 
@@ -129,7 +127,7 @@ class TextStream final : public ByteStream {
   }
 
   std::unique_ptr<ByteStream> text_;
-  StoredType type_;
+  ScalarType type_;
   std::unique_ptr<char[]> buffer_;
   std::size_t begin_ = 0, end_ = 0;  ///< of what is in the buffer and was not parsed
   std::uint64_t consumed_ = 0;
@@ -138,7 +136,7 @@ class TextStream final : public ByteStream {
 
 }  // namespace
 
-std::unique_ptr<ByteStream> make_text_stream(std::unique_ptr<ByteStream> text, StoredType type) {
+std::unique_ptr<ByteStream> make_text_stream(std::unique_ptr<ByteStream> text, ScalarType type) {
   return std::make_unique<TextStream>(std::move(text), type);
 }
 

@@ -2,7 +2,7 @@
 
 #include <memory>
 
-#include "core/wide_type.h"
+#include <isobrick/scalar.h>
 #include "io/bytes/byte_stream.h"
 
 namespace isobrick::inline v0 {
@@ -12,6 +12,6 @@ namespace isobrick::inline v0 {
 /// number of the type. Whole numbers may be written with a fraction of zeros; floating ones
 /// beyond the type's range are infinite or zero. Of types that are widened it takes 64-bit
 /// integers.
-std::unique_ptr<ByteStream> make_text_stream(std::unique_ptr<ByteStream> text, StoredType type);
+std::unique_ptr<ByteStream> make_text_stream(std::unique_ptr<ByteStream> text, ScalarType type);
 
 }  // namespace isobrick

@@ -40,7 +40,7 @@ class ScaledSource final : public VolumeSource {
 
 void scale_in_place(ScalarType stored, ScalarType scaled, std::size_t count, ValueScale scale,
                     std::byte* out) {
-  visit_scalar(stored, [&](auto stored_tag) {
+  visit_sample(stored, [&](auto stored_tag) {
     visit_scalar(scaled, [&](auto scaled_tag) {
       using From = typename decltype(stored_tag)::type;
       using To = typename decltype(scaled_tag)::type;

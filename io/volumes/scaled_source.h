@@ -28,7 +28,7 @@ void scale_in_place(ScalarType stored, ScalarType scaled, std::size_t count, Val
 
 /// What scaled samples of a stored type are.
 constexpr ScalarType scaled_type(ScalarType stored) {
-  return stored == ScalarType::f64 ? ScalarType::f64 : ScalarType::f32;
+  return size_of(stored) == 8 ? ScalarType::f64 : ScalarType::f32;
 }
 
 /// The smallest integer type, of no fewer bytes than `stored`, that holds what any of the scales

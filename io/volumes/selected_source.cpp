@@ -11,6 +11,7 @@
 
 #include <isobrick/error.h>
 #include <isobrick/lattice.h>
+#include "core/wide_type.h"
 
 namespace isobrick::inline v0 {
 namespace {
@@ -78,7 +79,7 @@ class SubsampledSource final : public VolumeSource {
       next_plane_ = from.hi.z;
     }
     whole_->read(from, plane_.data());
-    visit_scalar(info_.type, [&](auto tag) {
+    visit_sample(info_.type, [&](auto tag) {
       using T = typename decltype(tag)::type;
       for (Index y = wanted.lo.y; y < wanted.hi.y; y += stride_.y) {
         const std::byte* row =
@@ -125,15 +126,16 @@ class NodataSource final : public VolumeSource {
     // Stored samples are the last ones of the room, so that none is overwritten before it is read.
     const std::byte* from = out + count * (size_of(info_.type) - size_of(type));
     stored_->read(box, out + count * (size_of(info_.type) - size_of(type)));
-    visit_scalar(type, [&](auto tag) {
+    visit_sample(type, [&](auto tag) {
       using From = typename decltype(tag)::type;
       constexpr ScalarType to = type_with_nan(scalar_type_of<From>);
       using To = std::conditional_t<to == ScalarType::f64, double, float>;
       for (std::size_t i = 0; i < count; ++i) {
         From value;
         std::memcpy(&value, from + i * sizeof(From), sizeof(From));
-        const To real = static_cast<double>(value) == nodata_ ? std::numeric_limits<To>::quiet_NaN()
-                                                              : static_cast<To>(value);
+        To real = static_cast<To>(value);
+        if constexpr (std::is_integral_v<From> && sizeof(From) == 8) real = exact_double(value);
+        if (static_cast<double>(value) == nodata_) real = std::numeric_limits<To>::quiet_NaN();
         std::memcpy(out + i * sizeof(To), &real, sizeof(To));
       }
     });

@@ -118,7 +118,7 @@ VtkArrayLayout vtk_array_layout(const VtkFile& file, const VtkHeader& header,
   return layout;
 }
 
-VtkNumbers open_vtk_array(const VtkFile& file, const VtkArrayLayout& layout, StoredType type) {
+VtkNumbers open_vtk_array(const VtkFile& file, const VtkArrayLayout& layout, ScalarType type) {
   if (layout.encoding == VtkEncoding::ascii) {
     auto text = open_at(file, layout.begin);
     return {.stream = make_text_stream(make_element_stream(std::move(text)), type)};

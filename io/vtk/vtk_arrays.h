@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <memory>
 
-#include "core/wide_type.h"
+#include <isobrick/scalar.h>
 #include "io/bytes/byte_stream.h"
 #include "io/vtk/vtk_file.h"
 
@@ -37,6 +37,6 @@ struct VtkNumbers {
 
 /// Decodes an array. Text becomes numbers of `type` as they are stored, in this machine's byte
 /// order.
-VtkNumbers open_vtk_array(const VtkFile& file, const VtkArrayLayout& layout, StoredType type);
+VtkNumbers open_vtk_array(const VtkFile& file, const VtkArrayLayout& layout, ScalarType type);
 
 }  // namespace isobrick

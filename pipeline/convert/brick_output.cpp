@@ -11,7 +11,7 @@ namespace isobrick::inline v0 {
 namespace {
 
 double value_of(ScalarType type, std::uint64_t bits) {
-  return visit_scalar(type, [&](auto tag) {
+  return visit_sample(type, [&](auto tag) {
     typename decltype(tag)::type value;
     std::memcpy(&value, &bits, sizeof value);
     return static_cast<double>(value);

@@ -81,7 +81,7 @@ double decode_seconds(const CodecChain& chain, const Lattice& lattice,
 }
 
 /// Of one brick; no brick where it holds the fill value only.
-CodecSample sample_brick(const Lattice& lattice, double fill_value, int zstd_level,
+CodecSample sample_brick(const Lattice& lattice, const SampleValue& fill_value, int zstd_level,
                          std::span<std::byte> samples) {
   const CodecChain zstd = CodecChain::of(BrickCodec::zstd, zstd_level, false);
   const CodecChain packed = CodecChain::of(BrickCodec::packed, zstd_level, false);
@@ -109,7 +109,7 @@ void add(CodecSample& sum, const CodecSample& brick) {
 
 }  // namespace
 
-CodecSample sample_bricks(const Lattice& lattice, double fill_value, int zstd_level,
+CodecSample sample_bricks(const Lattice& lattice, const SampleValue& fill_value, int zstd_level,
                           const BrickRead& read) {
   const Index round = bricks_of_round(lattice);
   const std::vector<Int3> bricks = spread_bricks(lattice.bricks(), kRounds * round);

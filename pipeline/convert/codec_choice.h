@@ -21,7 +21,7 @@ using BrickRead = std::function<bool(Int3 b, std::span<std::byte>)>;
 /// Encodes some bricks of a lattice by both codecs, with the threads of the caller's arena. Which
 /// ones depends on the lattice and on which of them are stored, so that it is the same each time.
 /// At most a few hundred bricks are asked for, and of 64 MiB or 4 bricks some are read.
-CodecSample sample_bricks(const Lattice& lattice, double fill_value, int zstd_level,
+CodecSample sample_bricks(const Lattice& lattice, const SampleValue& fill_value, int zstd_level,
                           const BrickRead& read);
 
 /// The same of the finest level of a store that a source with random access is to become, in rows

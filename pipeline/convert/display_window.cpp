@@ -38,7 +38,8 @@ void add_samples(const Lattice& lattice, Int3 b, const std::byte* brick, Index s
   });
 }
 
-std::vector<double> some_samples(const StoreReader& store) {
+std::vector<double> some_samples(const StoreReader& reader) {
+  const StoreReader store = reader.native();
   const int level = level_of_few(store.info());
   const Lattice& lattice = store.info().levels[static_cast<std::size_t>(level)].lattice;
   const Int3 bricks = lattice.bricks();
@@ -54,7 +55,7 @@ std::vector<double> some_samples(const StoreReader& store) {
     if (!store.read_brick(level, b, brick.data()))
       fill_box(lattice.type, store.info().fill_value, {brick.data(), lattice.full_brick_box(b)},
                lattice.full_brick_box(b));
-    visit_scalar(lattice.type, [&](auto tag) {
+    visit_sample(lattice.type, [&](auto tag) {
       using T = typename decltype(tag)::type;
       add_samples<T>(lattice, b, brick.data(), std::max<Index>(step, 1), count, values);
     });

@@ -19,11 +19,16 @@ struct Rows {
   const T *a, *b, *c, *d;
 };
 
+/// Of eight integers of 64 bits.
+__extension__ using WideSum = __int128;
+
 template <class T>
 T mean_of_integers(const Rows<T>& r, Index x0, Index x1) {
-  using Sum = std::conditional_t<sizeof(T) == 4, std::int64_t, std::int32_t>;
+  using Sum = std::conditional_t<sizeof(T) == 8, WideSum,
+                                 std::conditional_t<sizeof(T) == 4, std::int64_t, std::int32_t>>;
   const auto column = [&](Index x) {
-    return static_cast<Sum>(static_cast<Sum>(r.a[x]) + r.b[x] + r.c[x] + r.d[x]);
+    return static_cast<Sum>(static_cast<Sum>(r.a[x]) + static_cast<Sum>(r.b[x]) +
+                            static_cast<Sum>(r.c[x]) + static_cast<Sum>(r.d[x]));
   };
   // An arithmetic shift rounds down, so adding half of 8 rounds halves up.
   return static_cast<T>((column(x0) + column(x1) + 4) >> 3);
@@ -213,7 +218,7 @@ Int3 factors_by_spacing(const Transform& transform, Int3 extent) {
 
 void downsample(Downsampling method, ScalarType type, Int3 extent, Int3 factors,
                 const std::byte* in, std::byte* out) {
-  visit_scalar(type, [&](auto tag) {
+  visit_sample(type, [&](auto tag) {
     using T = typename decltype(tag)::type;
     downsample_typed(method, extent, factors, reinterpret_cast<const T*>(in),
                      reinterpret_cast<T*>(out));

@@ -25,15 +25,15 @@ constexpr Int3 kChunk{kChunkBlocks, kChunkBlocks, kChunkBlocks};
 template <class T>
 class TypedSparseRanges final : public SparseRanges {
  public:
-  TypedSparseRanges(StoreWriter& store, int level, const Lattice& lattice, double fill_value,
-                    BrickTest is_there)
+  TypedSparseRanges(StoreWriter& store, int level, const Lattice& lattice,
+                    const SampleValue& fill_value, BrickTest is_there)
       : store_(store),
         level_(level),
         lattice_(lattice),
         chunks_(ceil_div(lattice.blocks(), kChunk)),
         is_there_(std::move(is_there)) {
     // Which zero a range keeps must not depend on where a sample lay.
-    fill_.include(static_cast<T>(fill_value));
+    fill_.include(fill_value.as<T>());
     if (!fill_.empty()) fill_ = {static_cast<T>(fill_.lo + T{0}), static_cast<T>(fill_.hi + T{0})};
   }
 
@@ -129,7 +129,7 @@ BrickBlocks scan_brick(const Lattice& lattice, Box3 box, const std::byte* sample
 }
 
 BrickBlocks constant_brick(const Lattice& lattice, Box3 box, std::uint64_t bits) {
-  return visit_scalar(lattice.type, [&](auto tag) {
+  return visit_sample(lattice.type, [&](auto tag) {
     using T = typename decltype(tag)::type;
     T value;
     std::memcpy(&value, &bits, sizeof value);
@@ -184,9 +184,10 @@ std::size_t sparse_ranges_bytes(const LevelInfo& level, std::span<const Int3> br
 }
 
 std::unique_ptr<SparseRanges> make_sparse_ranges(StoreWriter& store, int level,
-                                                 const Lattice& lattice, double fill_value,
+                                                 const Lattice& lattice,
+                                                 const SampleValue& fill_value,
                                                  BrickTest is_there) {
-  return visit_scalar(lattice.type, [&](auto tag) -> std::unique_ptr<SparseRanges> {
+  return visit_sample(lattice.type, [&](auto tag) -> std::unique_ptr<SparseRanges> {
     return std::make_unique<TypedSparseRanges<typename decltype(tag)::type>>(
         store, level, lattice, fill_value, std::move(is_there));
   });

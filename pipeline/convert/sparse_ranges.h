@@ -52,7 +52,7 @@ std::size_t sparse_ranges_bytes(const LevelInfo& level, std::span<const Int3> br
 
 /// `store` outlives the ranges.
 std::unique_ptr<SparseRanges> make_sparse_ranges(StoreWriter& store, int level,
-                                                 const Lattice& lattice, double fill_value,
-                                                 BrickTest is_there);
+                                                 const Lattice& lattice,
+                                                 const SampleValue& fill_value, BrickTest is_there);
 
 }  // namespace isobrick

@@ -19,7 +19,7 @@ class StoreSource final : public VolumeSource {
  public:
   StoreSource(const std::string& path, const VolumeRequest& request, int threads,
               const RemoteOptions& remote)
-      : store_(open_storage(path, remote), request.selection),
+      : store_(StoreReader(open_storage(path, remote), request.selection).native()),
         threads_(threads > 0 ? threads : tbb::info::default_concurrency()),
         arena_(threads_) {
     const LevelInfo& finest = store_.info().levels.front();

@@ -277,9 +277,13 @@ std::uint64_t export_zip(const StoreReader& store, const std::filesystem::path& 
 
 }  // namespace
 
-std::uint64_t export_volume(const StoreReader& store, const std::filesystem::path& out,
+std::uint64_t export_volume(const StoreReader& reader, const std::filesystem::path& out,
                             const ExportOptions& options, Progress& listener) {
   CancellableProgress progress(listener, options.cancel);
+  // OpenVDB has no 64-bit integers.
+  const bool is_native = options.format != ExportFormat::vdb;
+  const StoreReader native = reader.native();
+  const StoreReader& store = is_native ? native : reader;
   if (options.format == ExportFormat::zip) return export_zip(store, out, options, progress);
   if (options.isovalue && options.format != ExportFormat::vdb)
     throw UsageError("a level set can only be written as an OpenVDB file");

@@ -31,8 +31,9 @@ int choose_level(const StoreInfo& info) {
 
 /// Counts the samples of a level, brick by brick; damaged(what) for a brick that cannot be read.
 template <class Damaged>
-SampleCounts count_level(const StoreReader& store, int level, Progress& progress,
+SampleCounts count_level(const StoreReader& reader, int level, Progress& progress,
                          const Damaged& damaged) {
+  const StoreReader store = reader.native();
   const Lattice& lattice = store.info().levels[static_cast<std::size_t>(level)].lattice;
   const auto counts = make_value_counts(lattice.type);
   std::vector<std::byte> samples(lattice.brick_bytes());
@@ -100,7 +101,7 @@ std::optional<SampleCounts> stored_counts(const StoreReader& store) {
 std::optional<Histogram> stored_histogram(const StoreReader& store) {
   auto stored = stored_counts(store);
   if (!stored) return std::nullopt;
-  return histogram_of(std::move(*stored), store.info().type);
+  return histogram_of(std::move(*stored), surface_type(store.info().type));
 }
 
 Histogram histogram(const StoreReader& store, Progress& progress, int max_bins, bool leaves_out) {
@@ -114,7 +115,7 @@ Histogram histogram(const StoreReader& store, Progress& progress, int max_bins, 
   });
   const Lattice& lattice = store.info().levels[static_cast<std::size_t>(level)].lattice;
   if (left_out == static_cast<std::uint64_t>(volume(lattice.bricks()))) throw Error(damage);
-  Histogram h = rebin(histogram_of(std::move(counts), lattice.type), max_bins);
+  Histogram h = rebin(histogram_of(std::move(counts), surface_type(lattice.type)), max_bins);
   h.level = level;
   h.left_out = left_out;
   h.damage = std::move(damage);

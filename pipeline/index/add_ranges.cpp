@@ -65,12 +65,18 @@ LevelRangeOutput::LevelRangeOutput(const StoreReader& store, int level, Publishe
 
 LevelRangeOutput::LevelRangeOutput(const Lattice& lattice, const fs::path& root, int level,
                                    Publisher& publisher)
-    : blocks_(partial(root / block_range_folder("", level)), lattice.blocks(),
+    : type_(lattice.type),
+      blocks_(partial(root / block_range_folder("", level)), lattice.blocks(),
               range_array_metadata(lattice.blocks(), lattice.type), publisher),
       bricks_(partial(root / brick_range_folder("", level)), lattice.bricks(),
               range_array_metadata(lattice.bricks(), lattice.type), publisher),
       checksums_(partial(root / brick_checksum_folder("", level)), lattice.bricks(),
                  checksum_array_metadata(lattice.bricks()), publisher) {}
+
+void LevelRangeOutput::put(ItemArrayWriter& to, Box3 items, std::span<const std::byte> pairs) {
+  std::vector<std::byte> room;
+  to.put(items, stored_pairs(type_, pairs, room));
+}
 
 RangeChecksums LevelRangeOutput::finish() {
   return {
@@ -123,7 +129,8 @@ std::uint64_t range_piece_bytes(const LevelInfo& level, std::uint64_t memory, st
   return std::min(memory - fixed, kEnoughForAPiece);
 }
 
-void add_ranges(const StoreReader& store, std::uint64_t memory, int threads, Progress& progress) {
+void add_ranges(const StoreReader& reader, std::uint64_t memory, int threads, Progress& progress) {
+  const StoreReader store = reader.native();
   const StoreInfo& info = store.info();
   const std::uint64_t others = decode_extra(info, threads);
   std::vector<std::uint64_t> piece_bytes;

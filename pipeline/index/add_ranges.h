@@ -34,8 +34,8 @@ class LevelRangeOutput {
   LevelRangeOutput(const StoreReader& store, int level, Publisher& publisher);
 
   /// Pairs as RangeEmit.
-  void put_blocks(Box3 items, std::span<const std::byte> pairs) { blocks_.put(items, pairs); }
-  void put_bricks(Box3 items, std::span<const std::byte> pairs) { bricks_.put(items, pairs); }
+  void put_blocks(Box3 items, std::span<const std::byte> pairs) { put(blocks_, items, pairs); }
+  void put_bricks(Box3 items, std::span<const std::byte> pairs) { put(bricks_, items, pairs); }
   void put_checksums(Box3 bricks, std::span<const std::uint32_t> checksums) {
     checksums_.put(bricks, std::as_bytes(checksums));
   }
@@ -44,7 +44,9 @@ class LevelRangeOutput {
  private:
   LevelRangeOutput(const Lattice& lattice, const std::filesystem::path& root, int level,
                    Publisher& publisher);
+  void put(ItemArrayWriter& to, Box3 items, std::span<const std::byte> pairs);
 
+  ScalarType type_;
   ItemArrayWriter blocks_, bricks_, checksums_;
 };
 

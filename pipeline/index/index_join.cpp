@@ -100,10 +100,10 @@ void JoinedIndexParts::add_ranges(std::uint64_t memory, Progress& progress) cons
     throw UsageError(fmt::format(
         "a memory budget of {:.1f} MiB is too small: joining ranges needs --memory {}M at least",
         in_mib(memory), mib_above(least)));
-  const auto counts = make_value_counts(store_.info().type);
+  const auto counts = make_value_counts(store_.info().stored_type);
   progress.begin("ranges", total);
   replace_ranges(
-      store_,
+      store_.native(),
       [&](int level, LevelRangeOutput& output) { return merge(level, output, *counts, progress); },
       *counts);
   progress.end();
@@ -112,7 +112,8 @@ void JoinedIndexParts::add_ranges(std::uint64_t memory, Progress& progress) cons
 /// Whether any sample of a part that has bricks of the level is NaN.
 bool JoinedIndexParts::merge(int level, LevelRangeOutput& output, ValueCounts& counts,
                              Progress& progress) const {
-  const Lattice& lattice = store_.info().levels[static_cast<std::size_t>(level)].lattice;
+  Lattice lattice = store_.info().levels[static_cast<std::size_t>(level)].lattice;
+  lattice.type = store_.info().stored_type;
   const auto ranges = make_level_ranges(lattice);
   const auto close = [&](Index z1) {
     ranges->close(

@@ -25,7 +25,7 @@ class PartScan {
  public:
   PartScan(const StoreReader& store, const IndexParts& parts, Part part, std::uint64_t memory,
            int threads)
-      : store_(store), parts_(parts), part_(part), memory_(memory), threads_(threads) {}
+      : store_(store.native()), parts_(parts), part_(part), memory_(memory), threads_(threads) {}
 
   std::uint64_t bytes() const {
     std::uint64_t sum = 0;
@@ -104,7 +104,7 @@ class PartScan {
     return ranges->has_nan();
   }
 
-  const StoreReader& store_;
+  StoreReader store_;
   const IndexParts& parts_;
   Part part_;
   std::uint64_t memory_;

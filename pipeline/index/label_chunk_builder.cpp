@@ -3,6 +3,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <cmath>
 #include <memory>
 #include <optional>
 #include <span>
@@ -65,7 +66,7 @@ LabelList labels_in(const ReadBox& from, Box3 box) {
 }
 
 LabelList labels_in(ScalarType type, const ReadBox& from, Box3 box) {
-  return visit_scalar(type,
+  return visit_sample(type,
                       [&](auto tag) { return labels_in<typename decltype(tag)::type>(from, box); });
 }
 
@@ -81,7 +82,7 @@ std::uint64_t LabelChunkBuilder::min_memory(const Lattice& lattice, int threads)
 
 LabelChunkBuilder::LabelChunkBuilder(const StoreReader& store, int level, const IndexLayout& layout,
                                      std::uint64_t memory, int threads)
-    : store_(store), level_(level), layout_(layout) {
+    : store_(store.native()), level_(level), layout_(layout) {
   const Lattice& lattice = store.info().levels[static_cast<std::size_t>(level)].lattice;
   piece_ = IndexLayout::kChunk;
   while (piece_ > 1 && memory_for(lattice, threads, piece_) > memory) piece_ /= 2;
@@ -145,6 +146,10 @@ bool LabelChunkBuilder::Chunk::has_one_value(Int3 b) {
   ValueRange<double> all;
   for_each_point(table.box, [&](Int3 p) { all.include(table.at(p)); });
   if (all.lo != all.hi) return false;
+  // Of 64-bit integers the ends may be rounded, so that several labels look like one.
+  constexpr double first_rounded = 0x1p53;
+  if (is_wide_integer(builder_.store_.info().type) && std::abs(all.lo) >= first_rounded)
+    return false;
   list_of(b).labels = {label_of(all.lo)};
   return true;
 }
@@ -154,7 +159,7 @@ std::vector<LabelList> LabelChunkBuilder::Chunk::tile_lists(Int3 b, const ReadBo
   const Int3 tile{kLabelLeaf, kLabelLeaf, kLabelLeaf};
   for_each_point({{0, 0, 0}, layout_.leaves_of_brick(b)}, [&](Int3 t) {
     const Int3 lo = b * kListedBrick + t * kLabelLeaf;
-    lists.push_back(labels_in(layout_.type, from, samples_of({lo, lo + tile})));
+    lists.push_back(labels_in(builder_.store_.info().type, from, samples_of({lo, lo + tile})));
   });
   return lists;
 }
@@ -163,7 +168,8 @@ void LabelChunkBuilder::Chunk::add(std::span<const Int3> bricks) {
   Box3 box;
   for (const Int3 b : bricks) box = unite(box, {b, b + Int3{1, 1, 1}});
   const ReadBox from{nullptr, samples_of({box.lo * kListedBrick, box.hi * kListedBrick})};
-  samples_.resize(static_cast<std::size_t>(volume(from.box.extent())) * size_of(layout_.type));
+  samples_.resize(static_cast<std::size_t>(volume(from.box.extent())) *
+                  size_of(builder_.store_.info().type));
   read_slab(builder_.store_, builder_.level_, from.box, samples_.data());
   std::vector<std::vector<std::byte>> parts(bricks.size());
   tbb::parallel_for(std::size_t{0}, bricks.size(), [&](std::size_t i) {

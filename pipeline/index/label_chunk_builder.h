@@ -32,7 +32,7 @@ class LabelChunkBuilder {
  private:
   class Chunk;
 
-  const StoreReader& store_;
+  StoreReader store_;
   int level_;
   const IndexLayout& layout_;
   Index piece_ = 1;  ///< index bricks along each edge of what is read at a time

@@ -50,7 +50,7 @@ IndexLayout index_layout(const StoreReader& store, int level, std::string kind, 
   const LevelInfo& info = store.info().levels[static_cast<std::size_t>(level)];
   return {.kind = std::move(kind),
           .leaf = leaf,
-          .type = store.info().type,
+          .type = surface_type(store.info().type),
           .extent = info.lattice.extent,
           .zstd_level = zstd_level_of(store.info()),
           .ranges_crc32c = info.block_ranges_crc32c};

@@ -155,6 +155,8 @@ template class RangeScanner<std::uint32_t>;
 template class RangeScanner<std::int32_t>;
 template class RangeScanner<float>;
 template class RangeScanner<double>;
+template class RangeScanner<std::uint64_t>;
+template class RangeScanner<std::int64_t>;
 
 namespace {
 
@@ -245,7 +247,7 @@ std::unique_ptr<LevelRanges> make_level_ranges(const Lattice& lattice) {
 }
 
 std::unique_ptr<LevelRanges> make_part_ranges(const Lattice& lattice, Box3 part) {
-  return visit_scalar(lattice.type, [&](auto tag) -> std::unique_ptr<LevelRanges> {
+  return visit_sample(lattice.type, [&](auto tag) -> std::unique_ptr<LevelRanges> {
     return std::make_unique<TypedLevelRanges<typename decltype(tag)::type>>(lattice, part);
   });
 }

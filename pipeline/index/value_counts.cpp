@@ -350,9 +350,48 @@ class TypedValueCounts final : public ValueCounts {
   std::uint64_t not_a_number_ = 0, infinite_ = 0;
 };
 
+/// Counts 64-bit integers as the nearest doubles.
+class RoundedValueCounts final : public ValueCounts {
+ public:
+  explicit RoundedValueCounts(ScalarType type) : type_(type) {}
+
+  void add(const std::byte* samples, Box3 box, Box3 part) override {
+    visit_sample(type_, [&](auto tag) {
+      add_typed(reinterpret_cast<const typename decltype(tag)::type*>(samples), box, part);
+    });
+  }
+  void add(double value, std::uint64_t times) override { counts_.add(value, times); }
+  SampleCounts counts() override { return counts_.counts(); }
+
+ private:
+  template <class T>
+  void add_typed(const T* samples, Box3 box, Box3 part) {
+    std::array<double, kRun> run;
+    std::size_t gathered = 0;
+    const auto flush = [&] {
+      const Box3 row{{0, 0, 0}, {static_cast<Index>(gathered), 1, 1}};
+      if (gathered > 0) counts_.add(reinterpret_cast<const std::byte*>(run.data()), row, row);
+      gathered = 0;
+    };
+    for (Index z = part.lo.z; z < part.hi.z; ++z)
+      for (Index y = part.lo.y; y < part.hi.y; ++y) {
+        const T* row = samples + linear_index(Int3{part.lo.x, y, z} - box.lo, box.extent());
+        for (Index x = 0; x < part.extent().x; ++x) {
+          run[gathered++] = static_cast<double>(row[x]);
+          if (gathered == kRun) flush();
+        }
+      }
+    flush();
+  }
+
+  ScalarType type_;
+  TypedValueCounts<double> counts_;
+};
+
 }  // namespace
 
 std::unique_ptr<ValueCounts> make_value_counts(ScalarType type) {
+  if (is_wide_integer(type)) return std::make_unique<RoundedValueCounts>(type);
   return visit_scalar(type, [](auto tag) -> std::unique_ptr<ValueCounts> {
     return std::make_unique<TypedValueCounts<typename decltype(tag)::type>>();
   });
@@ -375,7 +414,7 @@ void add_counts(const SampleCounts& from, ValueCounts& to) {
 }
 
 std::size_t value_counts_bytes(ScalarType type, int threads) {
-  return visit_scalar(type, [&](auto tag) {
+  return visit_scalar(surface_type(type), [&](auto tag) {
     using T = typename decltype(tag)::type;
     // Twice what is shared: the bins before and after they are widened.
     return sizeof(TypedValueCounts<T>) + 2 * Bins<T>::kSlots * sizeof(std::uint64_t) +

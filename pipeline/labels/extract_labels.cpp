@@ -6,8 +6,9 @@
 
 namespace isobrick::inline v0 {
 
-LabelReport extract_labels(const StoreReader& store, const LabelOptions& options,
+LabelReport extract_labels(const StoreReader& reader, const LabelOptions& options,
                            const LabelVisitor& visit, Progress& progress) {
+  const StoreReader store = reader.native();
   LabelReport report, read;
   {
     const Stopwatch watch(read.seconds);

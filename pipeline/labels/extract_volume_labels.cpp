@@ -43,7 +43,8 @@ class ReadSamples final : public TileSamples {
     const Int3 n = box.extent();
     const SampleArray array{
         read.data(), box, {bytes, bytes * n.x, bytes * n.x * n.y}, volume_.read_type};
-    ArraySamples(volume_.lattice.extent, array, volume_.missing).gather(work, reach, block);
+    ArraySamples(volume_.lattice.extent, array, volume_.missing, volume_.use)
+        .gather(work, reach, block);
   }
 
  private:
@@ -69,7 +70,7 @@ LabelReport extract_labels(const Volume& volume, const LabelOptions& options,
   double seconds = 0;
   {
     const Stopwatch watch(seconds);
-    const VolumeSamples samples(volume);
+    const VolumeSamples samples(volume, SampleUse::labels);
     check_transform(samples.transform, samples.lattice.extent, "the volume");
     const LabelPlan plan =
         plan_label_memory(samples.lattice.type, read_bytes(samples, options), options);
@@ -78,7 +79,7 @@ LabelReport extract_labels(const Volume& volume, const LabelOptions& options,
                            .type = samples.lattice.type,
                            .transform = samples.transform,
                            .roi = options.roi.value_or(samples.lattice.box()),
-                           .labels = {options.labels, options.background},
+                           .labels = {options.labels, options.background, samples.lattice.type},
                            .smoothing = label_smoothing(options)};
     LabelMeshes meshes(image,
                        {options.scratch_beside, plan.label_bytes, plan.meshes, options.cancel});

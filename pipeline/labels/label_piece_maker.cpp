@@ -12,8 +12,9 @@
 
 namespace isobrick::inline v0 {
 
-PartPlans LabelPieceMaker::plan(const StoreReader& store, const LabelOptions& options,
+PartPlans LabelPieceMaker::plan(const StoreReader& reader, const LabelOptions& options,
                                 std::uint32_t parts) {
+  const StoreReader store = reader.native();
   check_part({1, parts});
   const LabelImage image = label_image_of(store, options);
   // By ranges alone: tasks divide alike whether or not their stores have lists.
@@ -29,11 +30,11 @@ PartPlans LabelPieceMaker::plan(const StoreReader& store, const LabelOptions& op
 
 LabelPieceMaker::LabelPieceMaker(const StoreReader& store, const LabelOptions& options,
                                  PartPlans plans)
-    : store_(store),
+    : store_(store.native()),
       options_(options),
       plans_(std::move(plans)),
-      image_(label_image_of(store, options)),
-      mesh_(label_mesh_json(store, options, image_)) {}
+      image_(label_image_of(store_, options)),
+      mesh_(label_mesh_json(store_, options, image_)) {}
 
 LabelPieceReport LabelPieceMaker::make(std::uint32_t number, const std::filesystem::path& path,
                                        bool force, Progress& progress) const {

@@ -21,7 +21,7 @@ class LabelPieceMaker {
                         Progress& progress) const;
 
  private:
-  const StoreReader& store_;
+  StoreReader store_;
   LabelOptions options_;
   PartPlans plans_;
   LabelImage image_;

@@ -1,7 +1,9 @@
 #include "pipeline/labels/label_selection.h"
 
 #include <algorithm>
+#include <cmath>
 #include <iterator>
+#include <limits>
 #include <utility>
 
 #include <fmt/format.h>
@@ -10,8 +12,9 @@
 
 namespace isobrick::inline v0 {
 
-LabelSelection::LabelSelection(std::vector<LabelRange> ranges, std::int64_t background)
-    : ranges_(std::move(ranges)), background_(background) {
+LabelSelection::LabelSelection(std::vector<LabelRange> ranges, std::int64_t background,
+                               ScalarType type)
+    : ranges_(std::move(ranges)), background_(background), is_unsigned_(type == ScalarType::u64) {
   for (const LabelRange& range : ranges_)
     if (range.last < range.first)
       throw UsageError(
@@ -28,6 +31,12 @@ LabelSelection::LabelSelection(std::vector<LabelRange> ranges, std::int64_t back
 }
 
 bool LabelSelection::contains(std::int64_t label) const {
+  if (is_unsigned_ && label < 0) {
+    if (!ranges_.empty()) return false;
+    throw Error(fmt::format(
+        "the label {} is beyond {}, the largest one of a mesh: choose others with --labels",
+        static_cast<std::uint64_t>(label), std::numeric_limits<std::int64_t>::max()));
+  }
   if (ranges_.empty()) return label != background_;
   const auto after =
       std::upper_bound(ranges_.begin(), ranges_.end(), label,
@@ -36,8 +45,12 @@ bool LabelSelection::contains(std::int64_t label) const {
 }
 
 bool LabelSelection::meets(double lo, double hi) const {
-  const auto background = static_cast<double>(background_);
-  if (ranges_.empty()) return lo <= hi && (lo != background || hi != background);
+  // Beyond 2⁵³ several labels have the range [lo, hi].
+  if (ranges_.empty()) {
+    const auto background = static_cast<double>(background_);
+    const bool is_exact = std::abs(background) < 0x1p53;
+    return lo <= hi && (!is_exact || lo != background || hi != background);
+  }
   // The first range that does not end before `lo`.
   const auto first = std::lower_bound(ranges_.begin(), ranges_.end(), lo,
                                       [](const LabelRange& range, double value) {

@@ -216,8 +216,9 @@ StoredRanges ranges_of(const StoreReader& store) {
 
 }  // namespace
 
-ConvertReport recode(const StoreReader& store, const std::filesystem::path& out,
+ConvertReport recode(const StoreReader& reader, const std::filesystem::path& out,
                      const RecodeOptions& options, Progress& listener) {
+  const StoreReader store = reader.native();
   CancellableProgress progress(listener, options.cancel);
   Stopwatch watch;
   const StoredRanges ranges = ranges_of(store);
@@ -243,7 +244,8 @@ ConvertReport recode(const StoreReader& store, const std::filesystem::path& out,
   return report;
 }
 
-CodecSample sample_codecs(const StoreReader& store, int zstd_level, int threads) {
+CodecSample sample_codecs(const StoreReader& reader, int zstd_level, int threads) {
+  const StoreReader store = reader.native();
   const StoreInfo& info = store.info();
   Workers workers(threads);
   return workers.execute([&] {

@@ -15,6 +15,7 @@
 #include "bricks/zarr/json_reader.h"
 #include "bricks/zarr/store_names.h"
 #include "core/cancellable_progress.h"
+#include "core/surface_range.h"
 #include "pipeline/histogram/histogram.h"
 #include "pipeline/index/level_scan.h"
 #include "pipeline/program_memory.h"
@@ -110,15 +111,11 @@ void LevelCheck::compare(bool blocks, Box3 items, std::span<const std::byte> pai
   } catch (const Error& e) {
     return damages_.add(fmt::format("level {}: {}", level_, e.what()));
   }
-  visit_scalar(lattice_.type, [&](auto tag) {
+  visit_sample(lattice_.type, [&](auto tag) {
     using T = typename decltype(tag)::type;
     const auto* found = reinterpret_cast<const ValueRange<T>*>(pairs.data());
     for_each_point(items, [&](Int3 p) {
-      const ValueRange<T> range = *found++;
-      const ValueRange<double> samples =
-          range.empty()
-              ? ValueRange<double>{}
-              : ValueRange<double>{static_cast<double>(range.lo), static_cast<double>(range.hi)};
+      const ValueRange<double> samples = surface_range(*found++);
       const ValueRange<double>& expected = stored.at(p);
       if (expected == samples || (expected.empty() && samples.empty()) || sees_unreadable(p, edge))
         return;
@@ -266,8 +263,9 @@ VerifyReport verify(const std::filesystem::path& path, const VerifyOptions& opti
   progress.begin("verify", bytes);
   const int threads = Workers(options.threads).threads();
   verify_groups(*store, damages);
+  const StoreReader native = store->native();
   for (std::size_t level = 0; level < levels.size(); ++level)
-    verify_level(*store, static_cast<int>(level), threads, options.memory, damages, progress);
+    verify_level(native, static_cast<int>(level), threads, options.memory, damages, progress);
   progress.end();
   std::uint64_t index_bytes = 0;
   const auto indexes = find_indexes(*store, damages);

@@ -7,6 +7,7 @@
 #include <type_traits>
 
 #include "core/copy_rows.h"
+#include "core/wide_type.h"
 
 namespace isobrick::inline v0 {
 namespace {
@@ -27,6 +28,8 @@ struct StridedCopy {
       From stored;
       std::memcpy(&stored, source, sizeof(From));
       To value = static_cast<To>(stored);
+      if constexpr (std::is_integral_v<From> && sizeof(From) == 8 && std::is_floating_point_v<To>)
+        value = exact_double(stored);
       if constexpr (may_miss)
         if ((present && !*present) || (nodata && static_cast<double>(stored) == *nodata))
           value = std::numeric_limits<To>::quiet_NaN();
@@ -67,19 +70,25 @@ bool is_aligned(const SampleArray& array) {
 
 }  // namespace
 
-ArraySamples::ArraySamples(Int3 extent, const SampleArray& array, const MissingSamples& missing)
+ScalarType ArraySamples::type_of(ScalarType stored, const MissingSamples& missing, SampleUse use) {
+  if (missing.any()) return type_with_nan(stored);
+  return use == SampleUse::surfaces ? surface_type(stored) : stored;
+}
+
+ArraySamples::ArraySamples(Int3 extent, const SampleArray& array, const MissingSamples& missing,
+                           SampleUse use)
     : array_(array),
       missing_(missing),
-      lattice_{extent, {64, 64, 64}, missing.any() ? type_with_nan(array.type) : array.type},
+      lattice_{extent, {64, 64, 64}, type_of(array.type, missing, use)},
       axes_(nearest_first(array.strides)),
-      in_place_(!missing.any() && is_aligned(array) &&
+      in_place_(lattice_.type == array.type && !missing.any() && is_aligned(array) &&
                 array.strides[axes_[0]] == static_cast<Index>(size_of(array.type))) {}
 
 void ArraySamples::copy(Box3 box, std::byte* to, Index row, Index plane) const {
   const Int3 n = box.extent();
   const std::byte* from = array_.at(box.lo);
   const auto size = static_cast<Index>(lattice_.sample_bytes());
-  if (!missing_.any() && array_.strides.x == size) {
+  if (lattice_.type == array_.type && !missing_.any() && array_.strides.x == size) {
     const RowStrides from_strides{array_.strides.y, array_.strides.z};
     const RowStrides to_strides{row * size, plane * size};
     switch (size) {
@@ -99,12 +108,14 @@ void ArraySamples::copy(Box3 box, std::byte* to, Index row, Index plane) const {
       .mask_strides = missing_.mask_strides,
       .to_strides = {size, row * size, plane * size},
       .axes = axes_};
-  visit_scalar(array_.type, [&](auto tag) {
+  visit_sample(array_.type, [&](auto tag) {
     using From = typename decltype(tag)::type;
     constexpr ScalarType wide = type_with_nan(scalar_type_of<From>);
     using To = std::conditional_t<wide == ScalarType::f64, double, float>;
     if (missing_.any())
       strided.run<From, To, true>();
+    else if (lattice_.type != array_.type)
+      strided.run<From, To, false>();
     else
       strided.run<From, From, false>();
   });

@@ -30,12 +30,20 @@ struct MissingSamples {
   bool any() const { return nodata || mask; }
 };
 
+/// What samples are for.
+enum class SampleUse : std::uint8_t {
+  surfaces,  ///< 64-bit integers are given as f64; one that no f64 is throws Error
+  labels     ///< samples are given as they are, as far as none is missing
+};
+
 /// The samples of a volume of which an array holds all, or those that its users need. Missing ones
 /// are NaN, in a type that has it. Owns nothing. Thread-safe.
 class ArraySamples final : public TileSamples {
  public:
-  ArraySamples(Int3 extent, const SampleArray& array, const MissingSamples& missing);
+  ArraySamples(Int3 extent, const SampleArray& array, const MissingSamples& missing, SampleUse use);
 
+  /// The type of the samples that are given.
+  static ScalarType type_of(ScalarType stored, const MissingSamples& missing, SampleUse use);
   /// Of the samples that it gives. The brick is of no matter.
   const Lattice& lattice() const { return lattice_; }
   void gather(const TileWork& work, Index reach, const TileBlock& block) const override;

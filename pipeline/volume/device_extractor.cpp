@@ -16,6 +16,8 @@ namespace {
 DeviceArray checked(DeviceArray array) {
   check_extent(array.extent);
   if (!array.samples) throw UsageError("the array has no samples");
+  if (is_wide_integer(array.type))
+    throw UsageError("surfaces of 64-bit integers on a device are not made; make them float64");
   const auto bytes = static_cast<Index>(size_of(array.type));
   array.strides = resolve_strides(array.strides, array.extent, bytes, "samples");
   for (int axis = 0; axis < 3; ++axis)

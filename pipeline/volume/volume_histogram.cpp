@@ -67,7 +67,7 @@ void count_read(const VolumeSamples& samples, Workers& workers, ValueCounts& cou
   for (std::size_t i = 0; i < boxes.size(); ++i) {
     const SampleArray read = reader.take();
     if (i + 1 < boxes.size()) reader.begin(boxes[i + 1]);
-    const ArraySamples array(lattice.extent, read, samples.missing);
+    const ArraySamples array(lattice.extent, read, samples.missing, samples.use);
     workers.execute([&] { count_boxes(array, parts_of(boxes[i], kCountedBox), counts); });
     progress.advance(static_cast<std::uint64_t>(volume(boxes[i].extent())) *
                      lattice.sample_bytes());

@@ -162,8 +162,9 @@ void VolumePass::append_tiles(Box3 tiles, std::vector<TileWork>& out) const {
 std::uint64_t VolumePass::fixed_bytes() const {
   const Lattice& lattice = samples_.lattice;
   const auto tiles = static_cast<std::uint64_t>(volume(lattice.tiles()));
-  const bool in_place =
-      samples_.array ? samples_.array->in_place() != nullptr : !samples_.missing.any();
+  const bool in_place = samples_.array
+                            ? samples_.array->in_place() != nullptr
+                            : !samples_.missing.any() && samples_.read_type == lattice.type;
   const std::uint64_t scans =
       in_place ? 0 : static_cast<std::uint64_t>(workers_.threads()) * range_scan_bytes(lattice);
   return samples_.source_bytes + samples_.range_bytes() + tiles * kListedTile + scans +
@@ -311,7 +312,7 @@ void VolumePass::extract_regions(CpuExtractor& extractor, Progress& progress) {
 }
 
 void VolumePass::extract_region(CpuExtractor& extractor, const SampleArray& read, Box3 tiles) {
-  const ArraySamples samples(samples_.lattice.extent, read, samples_.missing);
+  const ArraySamples samples(samples_.lattice.extent, read, samples_.missing, samples_.use);
   if (!samples_.is_known(tiles)) {
     workers_.execute([&] {
       const std::vector<Box3> rows = cut(tiles, {region_tiles_, 1, 1});

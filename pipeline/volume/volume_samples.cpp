@@ -31,7 +31,8 @@ Int3 resolve_strides(Int3 strides, Int3 extent, Index bytes, const char* what) {
   return strides;
 }
 
-VolumeSamples::VolumeSamples(const Volume& volume) : transform(volume.transform) {
+VolumeSamples::VolumeSamples(const Volume& volume, SampleUse for_use)
+    : transform(volume.transform), use(for_use) {
   check_extent(volume.extent);
   if (!volume.samples && !volume.read)
     throw UsageError("the volume has neither samples nor a function that reads them");
@@ -39,7 +40,7 @@ VolumeSamples::VolumeSamples(const Volume& volume) : transform(volume.transform)
   missing.mask = volume.mask;
   if (volume.mask)
     missing.mask_strides = resolve_strides(volume.mask_strides, volume.extent, 1, "mask");
-  lattice = {volume.extent, {64, 64, 64}, missing.any() ? type_with_nan(volume.type) : volume.type};
+  lattice = {volume.extent, {64, 64, 64}, ArraySamples::type_of(volume.type, missing, use)};
   if (volume.samples) {
     const auto bytes = static_cast<Index>(size_of(volume.type));
     array.emplace(volume.extent,
@@ -47,7 +48,7 @@ VolumeSamples::VolumeSamples(const Volume& volume) : transform(volume.transform)
                               {{0, 0, 0}, volume.extent},
                               resolve_strides(volume.strides, volume.extent, bytes, "samples"),
                               volume.type},
-                  missing);
+                  missing, use);
   }
   read = volume.read;
   concurrent = volume.concurrent_reads;
@@ -55,7 +56,7 @@ VolumeSamples::VolumeSamples(const Volume& volume) : transform(volume.transform)
 }
 
 VolumeSamples::VolumeSamples(VolumeSource& source)
-    : lattice{source.info().extent, {64, 64, 64}, source.info().type},
+    : lattice{source.info().extent, {64, 64, 64}, surface_type(source.info().type)},
       transform(source.info().transform),
       read([&source](Box3 box, std::byte* out) { source.read(box, out); }),
       concurrent(source.parallel()),

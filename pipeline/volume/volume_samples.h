@@ -30,13 +30,14 @@ struct VolumeSamples {
   RegionReader::Read read;
   bool concurrent = false;
   ScalarType read_type = ScalarType::u8;
+  SampleUse use = SampleUse::surfaces;
   std::uint64_t source_bytes = 0;  ///< VolumeSource::memory()
 
   std::unique_ptr<VolumeRanges> ranges;  ///< null before make_ranges()
   std::vector<bool> known;               ///< of each tile, C order: whether its ranges are found
 
   /// Throw UsageError for what VolumeExtractor refuses.
-  explicit VolumeSamples(const Volume& volume);
+  explicit VolumeSamples(const Volume& volume, SampleUse use = SampleUse::surfaces);
   explicit VolumeSamples(VolumeSource& source);
 
   /// Bytes that make_ranges() takes.

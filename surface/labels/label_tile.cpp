@@ -95,7 +95,7 @@ void LabelTile::read(const TileSamples& samples, ScalarType type, Int3 tile, Box
                   window_.steps()[2]});
   labels_.assign(1, 0);
   id_of_ = FlatMap<Id>();
-  visit_scalar(type, [&](auto tag) { number_labels<typename decltype(tag)::type>(roi); });
+  visit_sample(type, [&](auto tag) { number_labels<typename decltype(tag)::type>(roi); });
   chosen_.assign(labels_.size(), 0);
   find_edges();
   find_points();

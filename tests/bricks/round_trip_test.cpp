@@ -2,20 +2,22 @@
 
 #include <thread>
 
+#include "core/surface_range.h"
 #include "tests/bricks/store_fixture.h"
 
 namespace isobrick::test {
 namespace {
 
 void expect_ranges(const RangeTable& table, const std::vector<std::byte>& pairs, ScalarType type) {
-  visit_scalar(type, [&](auto tag) {
+  visit_sample(type, [&](auto tag) {
     using T = typename decltype(tag)::type;
     ASSERT_EQ(pairs.size(), table.ranges.size() * 2 * sizeof(T));
     for (std::size_t i = 0; i < table.ranges.size(); ++i) {
-      T pair[2];
-      std::memcpy(pair, pairs.data() + i * sizeof pair, sizeof pair);
-      ASSERT_EQ(table.ranges[i].lo, static_cast<double>(pair[0]));
-      ASSERT_EQ(table.ranges[i].hi, static_cast<double>(pair[1]));
+      ValueRange<T> range;
+      std::memcpy(&range, pairs.data() + i * sizeof range, sizeof range);
+      const ValueRange<double> expected = surface_range(range);
+      ASSERT_EQ(table.ranges[i].lo, expected.lo);
+      ASSERT_EQ(table.ranges[i].hi, expected.hi);
     }
   });
 }
@@ -23,8 +25,10 @@ void expect_ranges(const RangeTable& table, const std::vector<std::byte>& pairs,
 void expect_round_trip(const std::vector<Level>& levels, Compression compression, double fill) {
   const TemporaryFolder folder;
   write_store(folder / "a.zarr", levels, compression, fill);
-  const StoreReader store(folder / "a.zarr");
+  const StoreReader reader(folder / "a.zarr"), store = reader.native();
   ASSERT_EQ(store.info().levels.size(), levels.size());
+  EXPECT_EQ(reader.info().type, surface_type(levels[0].lattice.type));
+  EXPECT_EQ(reader.info().stored_type, levels[0].lattice.type);
   EXPECT_EQ(store.info().type, levels[0].lattice.type);
   EXPECT_EQ(store.info().may_have_nan, is_floating(levels[0].lattice.type));
   EXPECT_EQ(store.info().codec, compression.chain().name());

@@ -44,7 +44,7 @@ inline Level make_level(ScalarType type, Int3 extent, Index brick, Index shard, 
   level.samples.resize(static_cast<std::size_t>(volume(extent)) * size_of(type));
   std::mt19937 random(seed);
   const std::uint64_t bits = fill_bits(type, fill);
-  visit_scalar(type, [&](auto tag) {
+  visit_sample(type, [&](auto tag) {
     using T = typename decltype(tag)::type;
     std::byte* to = level.samples.data();
     for_each_point({{0, 0, 0}, extent}, [&](Int3 p) {
@@ -114,7 +114,7 @@ inline std::vector<std::byte> make_ranges(const Level& level, Int3 edge) {
   const Lattice& l = level.lattice;
   const Int3 items = ceil_div(l.extent, edge);
   std::vector<std::byte> pairs(static_cast<std::size_t>(volume(items)) * 2 * l.sample_bytes());
-  visit_scalar(l.type, [&](auto tag) {
+  visit_sample(l.type, [&](auto tag) {
     using T = typename decltype(tag)::type;
     std::byte* to = pairs.data();
     for_each_point({{0, 0, 0}, items}, [&](Int3 i) {

@@ -6,7 +6,7 @@
 #include "bricks/zarr/array_metadata.h"
 #include "tests/bricks/store_fixture.h"
 
-// Types of Zarr that none of ours is, read without loss or not at all.
+// Types of Zarr that surfaces are not made of: read without loss or not at all.
 namespace isobrick::test {
 namespace {
 
@@ -54,6 +54,20 @@ class WideTypes : public testing::Test {
     EXPECT_EQ(samples, expected);
   }
 
+  template <class T>
+  void expect_native(const std::vector<T>& expected) const {
+    const StoreReader surface(path), store = surface.native();
+    ASSERT_EQ(store.info().type, scalar_type_of<T>);
+    ASSERT_EQ(store.info().levels[0].lattice.type, scalar_type_of<T>);
+    EXPECT_EQ(surface.info().type, ScalarType::f64);
+    EXPECT_EQ(surface.info().stored_type, scalar_type_of<T>);
+    EXPECT_FALSE(store.info().may_have_nan);
+    std::vector<T> samples(4);
+    ASSERT_TRUE(store.read_brick(0, {0, 0, 0}, reinterpret_cast<std::byte*>(samples.data())));
+    EXPECT_EQ(samples, expected);
+    EXPECT_EQ(surface.bytes_read(), store.bytes_read()) << "they share what is counted";
+  }
+
   void expect_refused(const std::string& part) const {
     try {
       const StoreReader store(path);
@@ -71,27 +85,60 @@ class WideTypes : public testing::Test {
 };
 
 TEST_F(WideTypes, IntegersThatADoubleHolds) {
-  const std::uint64_t most = std::uint64_t{1} << 53;
+  const std::uint64_t most = std::uint64_t{1} << 53, largest = ~std::uint64_t{0};
   for (const auto& [type, version] : {std::pair("uint64", 3), {"<u8", 2}, {">u8", 2}}) {
     write<std::uint64_t>(type, {0, 1, most, most << 10}, 0, version);
     expect_samples<double>({0, 1, 0x1p53, 0x1p63});
+    expect_native<std::uint64_t>({0, 1, most, most << 10});
     write<std::uint64_t>(type, {0, most + 1, 0, 0}, 0, version);
     expect_refused("9007199254740993");
-    write<std::uint64_t>(type, {0, 0, 0, ~std::uint64_t{0}}, 0, version);
-    expect_refused("18446744073709551615");
+    write<std::uint64_t>(type, {0, most + 1, 0, largest}, 0, version);
+    expect_native<std::uint64_t>({0, most + 1, 0, largest});
   }
   for (const auto& [type, version] : {std::pair("int64", 3), {"<i8", 2}}) {
     const auto lowest = std::numeric_limits<std::int64_t>::min();
+    const auto highest = std::numeric_limits<std::int64_t>::max();
     write<std::int64_t>(type, {-1, 7, lowest, -9}, -5, version);
     expect_samples<double>({-1, 7, -0x1p63, -9});
     EXPECT_EQ(StoreReader(path).info().fill_value, -5);
-    write<std::int64_t>(type, {0, std::numeric_limits<std::int64_t>::max(), 0, 0}, 0, version);
+    write<std::int64_t>(type, {0, highest, 0, lowest + 1}, 0, version);
     expect_refused("9223372036854775807");
+    expect_native<std::int64_t>({0, highest, 0, lowest + 1});
   }
-  write<std::uint64_t>("uint64", {0, 0, 0, 0}, ~std::uint64_t{0}, 3);
-  expect_refused("18446744073709551615");
-  write<std::uint64_t>("uint64", {0, 0, 0, 0}, -1, 3);
-  expect_refused("uint64");
+}
+
+TEST_F(WideTypes, FillValuesAreExact) {
+  const std::uint64_t largest = ~std::uint64_t{0};
+  for (const auto& [type, version] : {std::pair("uint64", 3), {"<u8", 2}}) {
+    write<std::uint64_t>(type, {0, 0, 0, 0}, largest - 1, version);
+    const SampleValue fill = StoreReader(path).info().fill_value;
+    EXPECT_EQ(fill.text(), "18446744073709551614");
+    EXPECT_EQ(fill_bits(ScalarType::u64, fill), largest - 1);
+    for (const json& bad : {json(-1), json(0.5), json(18446744073709551616.0), json("7"),
+                            json(std::numeric_limits<std::int64_t>::min())}) {
+      write<std::uint64_t>(type, {0, 0, 0, 0}, bad, version);
+      expect_refused("fill_value");
+    }
+  }
+  const std::int64_t lowest = std::numeric_limits<std::int64_t>::min();
+  write<std::int64_t>("int64", {0, 0, 0, 0}, lowest + 1, 3);
+  EXPECT_EQ(StoreReader(path).info().fill_value.text(), "-9223372036854775807");
+  write<std::int64_t>("int64", {0, 0, 0, 0}, largest, 3);
+  expect_refused("18446744073709551615 is no int64");
+}
+
+TEST_F(WideTypes, MetadataKeepsThemExact) {
+  ArrayMetadata array;
+  array.shape = array.chunk = {2, 2, 2};
+  array.type = ScalarType::u64;
+  array.fill_value = ~std::uint64_t{0};
+  array.codecs = CodecChain::ours(3);
+  const std::string text = to_json(array);
+  EXPECT_NE(text.find("18446744073709551615"), std::string::npos) << text;
+  EXPECT_NE(text.find("\"uint64\""), std::string::npos) << text;
+  EXPECT_EQ(parse_array_metadata(text, "test"), array);
+  array.fill_value = ~std::uint64_t{0} - 1;
+  EXPECT_FALSE(parse_array_metadata(text, "test") == array);
 }
 
 TEST_F(WideTypes, HalfFloats) {

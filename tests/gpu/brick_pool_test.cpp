@@ -193,7 +193,7 @@ TEST_P(GpuPackedBricks, WithADamagedBlockAreNamed) {
   EXPECT_EQ(pool_->find_damaged(true), place(33));
 }
 
-INSTANTIATE_TEST_SUITE_P(Types, GpuPackedBricks, ::testing::ValuesIn(kScalarTypes),
+INSTANTIATE_TEST_SUITE_P(Types, GpuPackedBricks, ::testing::ValuesIn(kSurfaceTypes),
                          [](const auto& test) { return std::string(zarr_name(test.param)); });
 
 TEST(GpuBrickPoolSizes, BricksAreDecodedAsFarAheadAsThePoolHasRoom) {

@@ -62,7 +62,7 @@ class Field {
 /// A brick of such samples.
 inline std::vector<std::byte> make_brick(ScalarType type, Int3 extent, const std::string& kind,
                                          unsigned seed = 1) {
-  return visit_scalar(type, [&](auto tag) {
+  return visit_sample(type, [&](auto tag) {
     using T = typename decltype(tag)::type;
     std::vector<T> samples;
     Field<T> field(kind, seed);

@@ -57,7 +57,7 @@ SampleCounts naive_counts(std::span<const T> samples) {
 
 /// The same of samples as bytes.
 inline SampleCounts naive_counts(ScalarType type, std::span<const std::byte> bytes) {
-  return visit_scalar(type, [&](auto tag) {
+  return visit_sample(type, [&](auto tag) {
     using T = typename decltype(tag)::type;
     std::vector<T> samples(bytes.size() / sizeof(T));
     std::memcpy(samples.data(), bytes.data(), bytes.size());

@@ -76,7 +76,7 @@ def check(folder, name, samples):
 with tempfile.TemporaryDirectory() as name:
     failures = sum(
         check(pathlib.Path(name), kind, samples)
-        for dtype in ("<u1", "<i1", "<u2", "<i2", "<u4", "<i4", "<f4", "<f8")
+        for dtype in ("<u1", "<i1", "<u2", "<i2", "<u4", "<i4", "<u8", "<i8", "<f4", "<f8")
         for kind, samples in fields(dtype)
     )
 sys.exit(1 if failures else 0)

@@ -3,6 +3,7 @@
 
 #include <cstdio>
 
+#include "bricks/ranges/range_format.h"
 #include "tests/bricks/store_fixture.h"
 
 namespace isobrick::test {
@@ -18,6 +19,12 @@ void make_store(const std::filesystem::path& folder, const std::string& name,
   const std::filesystem::path store = folder / (name + ".zarr");
   write_store(store, levels, compression, fill);
   std::string line = store.string();
+  const auto stored_ranges = [&](const Level& level, Int3 edge) {
+    std::vector<std::byte> room;
+    const std::vector<std::byte> pairs = make_ranges(level, edge);
+    const auto stored = stored_pairs(level.lattice.type, pairs, room);
+    return std::vector<std::byte>(stored.begin(), stored.end());
+  };
   const auto add = [&](const std::string& array, const std::vector<std::byte>& bytes) {
     const std::filesystem::path raw = folder / (name + "." + std::to_string(line.size()) + ".raw");
     write_raw(raw, bytes);
@@ -26,9 +33,9 @@ void make_store(const std::filesystem::path& folder, const std::string& name,
   for (std::size_t i = 0; i < levels.size(); ++i) {
     const std::string number = std::to_string(i);
     add(number, levels[i].samples);
-    add("isobrick/" + number + "/range", make_ranges(levels[i], levels[i].lattice.brick));
+    add("isobrick/" + number + "/range", stored_ranges(levels[i], levels[i].lattice.brick));
     add("isobrick/" + number + "/block_range",
-        make_ranges(levels[i], {kBlockEdge, kBlockEdge, kBlockEdge}));
+        stored_ranges(levels[i], {kBlockEdge, kBlockEdge, kBlockEdge}));
   }
   std::printf("%s\n", line.c_str());
 }

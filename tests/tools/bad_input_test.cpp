@@ -32,7 +32,7 @@ TEST_F(BadInput, CommandLinesThatMakeNoSense) {
       {convert + Arguments{"--dims", "-2,2,2"}, "-2"},
       {convert + Arguments{"--dims", "4294967296,4294967296,2"}, "too large"},
       {convert + Arguments{"--dims", "99999999999999999999,1,1"}, "99999999999999999999"},
-      {convert + Arguments{"--type", "u64"}, "u64"},
+      {convert + Arguments{"--type", "u128"}, "u128"},
       {convert + Arguments{"--endian", "middle"}, "middle"},
       {convert + Arguments{"--codec", "rar"}, "rar"},
       {convert + Arguments{"--brick", "8"}, "--brick"},

@@ -97,7 +97,7 @@ TEST_F(ForeignImage, InfoListsChannelsInsteadOfRefusing) {
   EXPECT_EQ(listed["axes"][0]["count"], 2);
   EXPECT_EQ(listed["axes"][0]["names"], json({"nuclei", "walls"}));
   EXPECT_EQ(listed["spacing"], json({1.0, 2.0, 3.0}));
-  EXPECT_EQ(run_json({"info", image, "--channel", "1"})["type"], "float64");
+  EXPECT_EQ(run_json({"info", image, "--channel", "1"})["type"], "int64");
   expect_refused(run({"info", image, "--channel", "2"}), 2, {"--channel 2 is not there"});
   expect_refused(run({"export", image, path("x.raw")}), 2, {"--channel 0 … 1"});
 }

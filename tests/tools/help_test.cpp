@@ -35,7 +35,7 @@ TEST_F(Help, MarksWhatIsNeeded) {
   EXPECT_EQ(usage(run({"render", "--help"}).out).find("Usage: isobrick render MESH..."), 0u);
   EXPECT_EQ(usage(run({"help", "--help"}).out), "Usage: isobrick help [COMMAND] [OPTIONS]");
   const std::string synth = run({"synth", "--help"}).out;
-  for (const char* option : {"--dims X,Y,Z ", "--type u8|i8|u16|i16|u32|i32|f32|f64 "})
+  for (const char* option : {"--dims X,Y,Z ", "--type u8|i8|u16|i16|u32|i32|f32|f64|u64|i64 "})
     EXPECT_NE(usage(synth).find(option), std::string::npos) << option;
   EXPECT_NE(synth.find("Samples along x, y and z (required)\n"), std::string::npos);
   expect_refused(run({"synth", "gyroid", path("a.zarr"), "--type", "u8"}), 2,

@@ -242,26 +242,6 @@ TEST_F(LabelOption, AMeanOfLabelsIsMadeWithANote) {
   EXPECT_EQ(convert("max.zarr", "max").find("label image"), std::string::npos);
 }
 
-TEST_F(LabelOption, SixtyFourBitLabels) {
-  std::string samples(8 * 8 * 8 * 8, '\0');
-  for (std::size_t i = 0; i < samples.size(); i += 8) samples[i + 4] = i < 2048 ? 1 : 2;
-  const std::string header =
-      "NRRD0004\ntype: uint64\ndimension: 3\nsizes: 8 8 8\nencoding: raw\n"
-      "endian: little\nSegment0_ID:=a\nSegment0_Name:=big\n"
-      "Segment0_LabelValue:=8589934592\n\n";
-  write_file(path("big.nrrd"), header + samples);
-  run_json({"extract", path("big.nrrd"), "--labels", "all", "-o", path("meshes")});
-  const nlohmann::json labels = list("meshes")["labels"];
-  ASSERT_EQ(labels.size(), 2u);
-  EXPECT_EQ(labels[0]["label"], 4294967296);
-  EXPECT_EQ(labels[1]["name"], "big");
-  samples[8 * 100] = 1;
-  samples[8 * 100 + 7] = 1;
-  write_file(path("big.nrrd"), header + samples);
-  expect_refused(run({"convert", path("big.nrrd"), path("never.zarr")}), 1,
-                 {"big.nrrd", "72057598332895233", "y = 4, z = 1"});
-}
-
 TEST_F(LabelOption, ReadsTheBricksOfALabelByLists) {
   const auto made = run_json({"index", store_, "--kind", "labels"});
   EXPECT_EQ(made["kind"], "labels");

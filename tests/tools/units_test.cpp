@@ -48,7 +48,9 @@ TEST(Parse, HalfSpace) {
 TEST(Parse, Types) {
   EXPECT_EQ(parse_type("i16"), ScalarType::i16);
   EXPECT_EQ(parse_type("float64"), ScalarType::f64);
-  EXPECT_THROW(parse_type("i64"), UsageError);
+  EXPECT_EQ(parse_type("i64"), ScalarType::i64);
+  EXPECT_EQ(parse_type("uint64"), ScalarType::u64);
+  EXPECT_THROW(parse_type("f16"), UsageError);
   EXPECT_EQ(parse_byte_order("big"), ByteOrder::big);
   EXPECT_THROW(parse_byte_order("middle"), UsageError);
 }

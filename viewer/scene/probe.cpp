@@ -61,7 +61,7 @@ class Field {
     const Int3 b{p.x / lattice_.brick.x, p.y / lattice_.brick.y, p.z / lattice_.brick.z};
     const std::shared_ptr<const BrickSamples> brick = find_(b);
     if (!brick) return std::nullopt;
-    if (brick->empty()) return info_.fill_value;
+    if (brick->empty()) return double{info_.fill_value};
     const auto i = static_cast<std::size_t>(linear_index(p - b * lattice_.brick, lattice_.brick));
     return visit_scalar(lattice_.type, [&](auto tag) {
       typename decltype(tag)::type v;

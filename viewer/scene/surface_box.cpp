@@ -47,7 +47,7 @@ class ReachCounts {
       const bool stored = source.read_brick(0, b, brick.data());
       for_each_point(intersect(lattice.brick_box(b), samples), [&](Int3 p) {
         const Int3 q = p - b * lattice.brick;
-        at(p) = count(isovalues, stored ? value(brick, lattice, q) : info.fill_value);
+        at(p) = count(isovalues, stored ? value(brick, lattice, q) : double{info.fill_value});
       });
     });
   }

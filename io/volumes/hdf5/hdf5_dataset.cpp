@@ -47,7 +47,7 @@ std::size_t cache_bytes(const std::vector<ArrayAxis>& axes, const std::vector<In
 struct Hdf5Dataset::Handles {
   std::string path;
   Hdf5Handle file, dataset;
-  StoredType type;
+  ScalarType type;
   std::vector<ArrayAxis> axes;
   bool labelled = false;
   Vec3d element_size;
@@ -80,7 +80,7 @@ std::vector<Index> Hdf5Dataset::Handles::chunk_edges(hid_t creation) const {
       static_cast<int>(chunk.size()))
     hdf5_fail(path, "the chunks have no size");
   constexpr double kMax = 0x1p40;
-  double bytes = static_cast<double>(size_of(type.type));
+  double bytes = static_cast<double>(size_of(type));
   for (const hsize_t edge : chunk) bytes *= static_cast<double>(edge);
   if (!(bytes >= 1 && bytes < kMax))
     throw UsageError(fmt::format("'{}': chunks of {} bytes are too large", path, bytes));
@@ -93,11 +93,11 @@ bool Hdf5Dataset::Handles::decode_chunks(hid_t creation, const std::vector<Index
   const std::optional<bool> swap = hdf5_swapped(dataset, type);
   std::optional<Hdf5Encoding> encoding = read_hdf5_encoding(creation);
   if (!swap || !encoding) return false;
-  encoding->chunk_bytes = size_of(type.type);
+  encoding->chunk_bytes = size_of(type);
   for (const Index edge : edges) encoding->chunk_bytes *= static_cast<std::size_t>(edge);
   if (encoding->chunk_bytes > kMaxHdf5Chunk) return false;
   Hdf5ChunkLayout layout{
-      path, {}, edges, *encoding, size_of(type.type), *swap, read_hdf5_fill(creation, type)};
+      path, {}, edges, *encoding, size_of(type), *swap, read_hdf5_fill(creation, type)};
   for (const ArrayAxis& axis : axes) layout.extent.push_back(axis.size);
   const auto fetch = [this, most = encoding->max_packed()](const std::vector<Index>& first,
                                                            PodBuffer<std::byte>& bytes) {
@@ -151,7 +151,7 @@ void Hdf5Dataset::Handles::open(const std::string& name, int threads) {
     memory = chunks->memory();
     return;
   }
-  std::size_t chunk = size_of(type.type);
+  std::size_t chunk = size_of(type);
   for (const Index edge : edges) chunk *= static_cast<std::size_t>(edge);
   const std::size_t cache = cache_bytes(axes, edges, chunk);
   memory = cache + 2 * chunk;
@@ -189,7 +189,7 @@ Hdf5Dataset::~Hdf5Dataset() {
   handles_.reset();
 }
 
-const StoredType& Hdf5Dataset::type() const { return handles_->type; }
+ScalarType Hdf5Dataset::type() const { return handles_->type; }
 const std::vector<ArrayAxis>& Hdf5Dataset::axes() const { return handles_->axes; }
 bool Hdf5Dataset::labelled() const { return handles_->labelled; }
 Vec3d Hdf5Dataset::element_size() const { return handles_->element_size; }

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include <isobrick/array_view.h>
-#include "core/wide_type.h"
+#include <isobrick/scalar.h>
 
 namespace isobrick::inline v0 {
 
@@ -20,7 +20,7 @@ class Hdf5Dataset {
   Hdf5Dataset(const std::string& path, const std::string& name, int threads);
   ~Hdf5Dataset();
 
-  const StoredType& type() const;
+  ScalarType type() const;
   /// Fastest first, with roles and directions from the labels of the dimensions.
   const std::vector<ArrayAxis>& axes() const;
   /// Whether labels give all roles.

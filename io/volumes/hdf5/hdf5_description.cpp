@@ -153,7 +153,7 @@ void refuse_hdf5_dataset(const std::string& path, hid_t file, const std::string&
                   names.empty() ? "nor any of 3 or more dimensions" : "it has " + list_of(names)));
 }
 
-StoredType read_hdf5_type(const std::string& path, hid_t dataset) {
+ScalarType read_hdf5_type(const std::string& path, hid_t dataset) {
   const Hdf5Handle type(H5Dget_type(dataset), H5Tclose);
   const std::size_t size = H5Tget_size(type);
   const H5T_class_t kind = H5Tget_class(type);
@@ -164,7 +164,7 @@ StoredType read_hdf5_type(const std::string& path, hid_t dataset) {
     if (size == 1) return is_signed ? ScalarType::i8 : ScalarType::u8;
     if (size == 2) return is_signed ? ScalarType::i16 : ScalarType::u16;
     if (size == 4) return is_signed ? ScalarType::i32 : ScalarType::u32;
-    if (size == 8) return is_signed ? WideType::i64 : WideType::u64;
+    if (size == 8) return is_signed ? ScalarType::i64 : ScalarType::u64;
   }
   constexpr const char* kinds[] = {"integers", "floats",     "times",
                                    "text",     "bits",       "opaque bytes",
@@ -174,10 +174,8 @@ StoredType read_hdf5_type(const std::string& path, hid_t dataset) {
                                kind >= 0 && kind < 11 ? kinds[kind] : "unknown", size));
 }
 
-hid_t hdf5_native_type(const StoredType& stored) {
-  if (stored.wide == WideType::u64) return H5T_NATIVE_UINT64;
-  if (stored.wide == WideType::i64) return H5T_NATIVE_INT64;
-  switch (stored.type) {
+hid_t hdf5_native_type(ScalarType stored) {
+  switch (stored) {
     case ScalarType::u8: return H5T_NATIVE_UINT8;
     case ScalarType::i8: return H5T_NATIVE_INT8;
     case ScalarType::u16: return H5T_NATIVE_UINT16;
@@ -186,11 +184,13 @@ hid_t hdf5_native_type(const StoredType& stored) {
     case ScalarType::i32: return H5T_NATIVE_INT32;
     case ScalarType::f32: return H5T_NATIVE_FLOAT;
     case ScalarType::f64: break;
+    case ScalarType::u64: return H5T_NATIVE_UINT64;
+    case ScalarType::i64: return H5T_NATIVE_INT64;
   }
   return H5T_NATIVE_DOUBLE;
 }
 
-std::optional<bool> hdf5_swapped(hid_t dataset, const StoredType& type) {
+std::optional<bool> hdf5_swapped(hid_t dataset, ScalarType type) {
   const Hdf5Handle stored(H5Dget_type(dataset), H5Tclose);
   if (H5Tequal(stored, hdf5_native_type(type)) > 0) return false;
   const Hdf5Handle other(H5Tcopy(hdf5_native_type(type)), H5Tclose);
@@ -225,7 +225,7 @@ std::optional<Hdf5Encoding> read_hdf5_encoding(hid_t creation) {
   return encoding;
 }
 
-std::array<std::byte, 8> read_hdf5_fill(hid_t creation, const StoredType& type) {
+std::array<std::byte, 8> read_hdf5_fill(hid_t creation, ScalarType type) {
   std::array<std::byte, 8> fill{};
   H5D_fill_value_t status = H5D_FILL_VALUE_UNDEFINED;
   if (H5Pfill_value_defined(creation, &status) >= 0 && status != H5D_FILL_VALUE_UNDEFINED)

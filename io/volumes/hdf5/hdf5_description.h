@@ -7,7 +7,7 @@
 #include <vector>
 
 #include <isobrick/array_view.h>
-#include "core/wide_type.h"
+#include <isobrick/scalar.h>
 #include "io/volumes/hdf5/hdf5_filters.h"
 #include "io/volumes/hdf5/hdf5_library.h"
 
@@ -24,12 +24,12 @@ std::string choose_hdf5_dataset(const std::string& path, hid_t file, const std::
 [[noreturn]] void refuse_hdf5_dataset(const std::string& path, hid_t file, const std::string& name);
 
 /// Throws UsageError for samples that are no numbers of ours.
-StoredType read_hdf5_type(const std::string& path, hid_t dataset);
+ScalarType read_hdf5_type(const std::string& path, hid_t dataset);
 /// The library's name for a type in memory.
-hid_t hdf5_native_type(const StoredType& stored);
+hid_t hdf5_native_type(ScalarType stored);
 /// Whether samples in the file are of the other byte order than `type`'s in memory;
 /// nothing where they differ in more than that.
-std::optional<bool> hdf5_swapped(hid_t dataset, const StoredType& type);
+std::optional<bool> hdf5_swapped(hid_t dataset, ScalarType type);
 
 /// The sizes, fastest first, with the roles and directions of the attribute DIMENSION_LABELS.
 /// `labelled` becomes whether it gives all roles.
@@ -43,6 +43,6 @@ void check_hdf5_storage(const std::string& path, hid_t creation);
 /// The filters of a dataset's chunks, where we can undo all of them; without chunk_bytes.
 std::optional<Hdf5Encoding> read_hdf5_encoding(hid_t creation);
 /// A sample of chunks that are not there; zero where the file leaves it open.
-std::array<std::byte, 8> read_hdf5_fill(hid_t creation, const StoredType& type);
+std::array<std::byte, 8> read_hdf5_fill(hid_t creation, ScalarType type);
 
 }  // namespace isobrick

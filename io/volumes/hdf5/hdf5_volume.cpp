@@ -11,7 +11,6 @@
 #include <isobrick/error.h>
 #include <isobrick/pod_buffer.h>
 #include "io/volumes/hdf5/hdf5_dataset.h"
-#include "io/volumes/widened_source.h"
 
 namespace isobrick::inline v0 {
 namespace {
@@ -91,7 +90,7 @@ class Hdf5Source final : public VolumeSource {
           step[axis] = samples;
           samples *= piece.extent()[axis];
         }
-    visit_scalar(info_.type, [&](auto tag) {
+    visit_sample(info_.type, [&](auto tag) {
       using T = typename decltype(tag)::type;
       const auto* from = reinterpret_cast<const T*>(turned_.data());
       for (Index z = piece.lo.z; z < piece.hi.z; ++z)
@@ -165,11 +164,9 @@ std::unique_ptr<VolumeSource> open_hdf5(const std::string& file, const std::stri
     transform.spacing = spacing_of(view, opened->element_size());
     transform.unit = "micrometer";
   }
-  const StoredType type = opened->type();
-  VolumeInfo info = describe_volume(file, view.extent, type.type, transform, request);
-  return widen_source(
-      std::make_unique<Hdf5Source>(std::move(info), std::move(opened), view, std::move(fixed)),
-      type.wide);
+  const ScalarType type = opened->type();
+  VolumeInfo info = describe_volume(file, view.extent, type, transform, request);
+  return std::make_unique<Hdf5Source>(std::move(info), std::move(opened), view, std::move(fixed));
 }
 
 }  // namespace isobrick

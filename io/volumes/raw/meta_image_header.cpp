@@ -98,14 +98,14 @@ class Fields {
   std::uint64_t size_ = 0;
 };
 
-StoredType read_type(const Fields& fields) {
+ScalarType read_type(const Fields& fields) {
   // MET_LONG is missing on purpose: it has 4 or 8 bytes, depending on who wrote it.
-  constexpr std::pair<std::string_view, StoredType> types[] = {
-      {"met_uchar", ScalarType::u8},     {"met_char", ScalarType::i8},
-      {"met_ushort", ScalarType::u16},   {"met_short", ScalarType::i16},
-      {"met_uint", ScalarType::u32},     {"met_int", ScalarType::i32},
-      {"met_ulong_long", WideType::u64}, {"met_long_long", WideType::i64},
-      {"met_float", ScalarType::f32},    {"met_double", ScalarType::f64},
+  constexpr std::pair<std::string_view, ScalarType> types[] = {
+      {"met_uchar", ScalarType::u8},       {"met_char", ScalarType::i8},
+      {"met_ushort", ScalarType::u16},     {"met_short", ScalarType::i16},
+      {"met_uint", ScalarType::u32},       {"met_int", ScalarType::i32},
+      {"met_ulong_long", ScalarType::u64}, {"met_long_long", ScalarType::i64},
+      {"met_float", ScalarType::f32},      {"met_double", ScalarType::f64},
   };
   const std::string name = lower(fields.need("ElementType"));
   for (const auto& [spelling, type] : types)

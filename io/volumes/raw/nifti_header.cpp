@@ -118,11 +118,12 @@ Version find_version(std::span<const std::byte> head) {
   return version;
 }
 
-StoredType read_type(const std::string& path, int code) {
-  constexpr std::pair<int, StoredType> types[] = {
-      {2, ScalarType::u8},   {4, ScalarType::i16},  {8, ScalarType::i32},   {16, ScalarType::f32},
-      {64, ScalarType::f64}, {256, ScalarType::i8}, {512, ScalarType::u16}, {768, ScalarType::u32},
-      {1024, WideType::i64}, {1280, WideType::u64}};
+ScalarType read_type(const std::string& path, int code) {
+  constexpr std::pair<int, ScalarType> types[] = {{2, ScalarType::u8},     {4, ScalarType::i16},
+                                                  {8, ScalarType::i32},    {16, ScalarType::f32},
+                                                  {64, ScalarType::f64},   {256, ScalarType::i8},
+                                                  {512, ScalarType::u16},  {768, ScalarType::u32},
+                                                  {1024, ScalarType::i64}, {1280, ScalarType::u64}};
   constexpr std::pair<int, const char*> others[] = {{1, "bits"},
                                                     {32, "complex numbers"},
                                                     {128, "RGB colours"},

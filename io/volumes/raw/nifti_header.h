@@ -5,8 +5,8 @@
 #include <string>
 
 #include <isobrick/array_view.h>
+#include <isobrick/scalar.h>
 #include <isobrick/transform.h>
-#include "core/wide_type.h"
 #include "io/volumes/scaled_source.h"
 
 namespace isobrick::inline v0 {
@@ -14,7 +14,7 @@ namespace isobrick::inline v0 {
 /// The header of a NIfTI file.
 struct NiftiHeader {
   ArrayView view;
-  StoredType type;
+  ScalarType type;
   bool swap = false;         ///< of the other byte order
   bool detached = false;     ///< the samples lie in a file of their own (.hdr and .img)
   std::uint64_t offset = 0;  ///< of the first sample of the array

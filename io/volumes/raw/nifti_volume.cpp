@@ -15,7 +15,6 @@
 #include "io/volumes/raw/raw_source.h"
 #include "io/volumes/raw/text_header.h"
 #include "io/volumes/stream_source.h"
-#include "io/volumes/widened_source.h"
 
 namespace isobrick::inline v0 {
 namespace {
@@ -75,7 +74,7 @@ bool has_image_name(const std::string& path) {
 /// The real values of the samples as they are stored.
 std::unique_ptr<VolumeSource> scaled(std::unique_ptr<VolumeSource> stored,
                                      const NiftiHeader& header) {
-  return scale_source(widen_source(std::move(stored), header.type.wide), header.scale);
+  return scale_source(std::move(stored), header.scale);
 }
 
 }  // namespace
@@ -102,10 +101,10 @@ std::unique_ptr<VolumeSource> open_nifti(const std::string& path, const VolumeRe
   refuse_raw_description(path, "a NIfTI file", request);
   const NiftiHeader header = parse_nifti_header(path, read_head(path), request.selection);
   const std::string data_path = header.detached ? image_path(path) : path;
-  const std::size_t sample = size_of(header.type.type);
+  const std::size_t sample = size_of(header.type);
   SampleLayout layout;
   layout.info =
-      describe_volume(data_path, header.view.extent, header.type.type, header.transform, request);
+      describe_volume(data_path, header.view.extent, header.type, header.transform, request);
   layout.info.files = {path, data_path};
   if (header.is_label_image) layout.info.labels.emplace();
   layout.offset = header.offset + static_cast<std::uint64_t>(header.view.first) * sample;

@@ -18,9 +18,9 @@
 namespace isobrick::inline v0 {
 namespace {
 
-std::optional<StoredType> parse_type(const std::string& name) {
+std::optional<ScalarType> parse_type(const std::string& name) {
   struct TypeNames {
-    StoredType type;
+    ScalarType type;
     std::array<std::string_view, 7> names;
   };
   static constexpr TypeNames all[] = {
@@ -31,10 +31,10 @@ std::optional<StoredType> parse_type(const std::string& name) {
       {ScalarType::u16, {"ushort", "unsigned short", "unsigned short int", "uint16", "uint16_t"}},
       {ScalarType::i32, {"int", "signed int", "int32", "int32_t"}},
       {ScalarType::u32, {"uint", "unsigned int", "uint32", "uint32_t"}},
-      {WideType::i64,
+      {ScalarType::i64,
        {"longlong", "long long", "long long int", "signed long long", "signed long long int",
         "int64", "int64_t"}},
-      {WideType::u64,
+      {ScalarType::u64,
        {"ulonglong", "unsigned long long", "unsigned long long int", "uint64", "uint64_t"}},
       {ScalarType::f32, {"float"}},
       {ScalarType::f64, {"double"}},
@@ -45,14 +45,16 @@ std::optional<StoredType> parse_type(const std::string& name) {
   return std::nullopt;
 }
 
-/// Whether a sample can have this value; a float may round it.
-bool holds(ScalarType type, double value) {
-  return visit_scalar(type, [&](auto tag) {
-    using Limits = std::numeric_limits<typename decltype(tag)::type>;
-    return !Limits::is_integer ||
-           (value == std::trunc(value) && value >= static_cast<double>(Limits::min()) &&
-            value <= static_cast<double>(Limits::max()));
-  });
+/// A number without digits that are lost; nothing where the text is none.
+std::optional<SampleValue> parse_number(const std::string& text) {
+  const auto parse = [&](auto value) -> std::optional<SampleValue> {
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+    if (error != std::errc{} || end != text.data() + text.size()) return std::nullopt;
+    return value;
+  };
+  if (const auto value = parse(std::int64_t{})) return value;
+  if (const auto value = parse(std::uint64_t{})) return value;
+  return parse(0.0);
 }
 
 /// The fields by name, names in lower case without blanks ("data file" and
@@ -353,12 +355,11 @@ void read_grid(const Fields& fields, TextHeader& header) {
   header.grid_name = printable(fields.pair(kNrrdGridName), kMaxName);
   const std::string fill = fields.pair(kNrrdFillValue);
   if (fill.empty()) return;
-  double value = 0;
-  const auto [end, error] = std::from_chars(fill.data(), fill.data() + fill.size(), value);
-  if (error != std::errc{} || end != fill.data() + fill.size() || !holds(header.type.type, value))
+  const auto value = parse_number(fill);
+  if (!value || !is_sample(*value, header.type))
     header_error(fields.path(), fmt::format("'{}': '{}' is no {}", kNrrdFillValue,
                                             printable(fill, 60), short_name(header.type)));
-  header.fill_value = value;
+  header.fill_value = *value;
 }
 
 }  // namespace

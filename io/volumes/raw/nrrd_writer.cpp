@@ -41,7 +41,7 @@ std::string nrrd_header_text(const VolumeInfo& info, const std::string& data_fil
   if (!info.grid_name.empty())
     text += pair_text(kNrrdGridName, printable(info.grid_name, info.grid_name.size()));
   if (!info.grid_class.empty() || info.fill_value != 0)
-    text += pair_text(kNrrdFillValue, fmt::format("{}", info.fill_value));
+    text += pair_text(kNrrdFillValue, info.fill_value.text());
   return text + (data_file.empty() ? "\n" : fmt::format("data file: {}\n", data_file));
 }
 

@@ -20,7 +20,6 @@
 #include "io/volumes/raw/raw_name.h"
 #include "io/volumes/raw/raw_source.h"
 #include "io/volumes/stream_source.h"
-#include "io/volumes/widened_source.h"
 
 namespace isobrick::inline v0 {
 namespace {
@@ -132,7 +131,7 @@ void take_grid(const TextHeader& header, VolumeInfo& info) {
   info.grid_class = header.grid_class;
   info.grid_name = header.grid_name;
   info.labels = header.labels;
-  if (header.fill_value && info.type == header.type.type) info.fill_value = *header.fill_value;
+  if (header.fill_value && info.type == header.type) info.fill_value = *header.fill_value;
 }
 
 std::vector<fs::path> files_of(const TextHeader& header) {
@@ -146,8 +145,7 @@ std::unique_ptr<VolumeSource> open_described(const TextHeader& header, const Vol
                                              DescribedBy by, File file) {
   const std::string& path = header.data_paths[0];
   if (request.extent || request.type || request.offset) by = DescribedBy::caller;
-  const StoredType stored = request.type ? StoredType(*request.type) : header.type;
-  const ScalarType type = stored.type;
+  const ScalarType type = request.type.value_or(header.type);
   SampleLayout layout;
   layout.info = describe_volume(path, request.extent.value_or(header.view.extent), type,
                                 header.transform, request);
@@ -173,7 +171,7 @@ std::unique_ptr<VolumeSource> open_described(const TextHeader& header, const Vol
     layout.offset += static_cast<std::uint64_t>(header.view.first) * size_of(type);
     layout.stride = header.view.stride;
   }
-  return widen_source(make_raw_source(std::move(layout), std::move(file)), stored.wide);
+  return make_raw_source(std::move(layout), std::move(file));
 }
 
 /// The bytes of one data file, from where its samples begin.
@@ -231,7 +229,7 @@ std::unique_ptr<VolumeSource> open_text_volume(const TextHeader& header,
   refuse_raw_description(header.path, "a header that describes its samples", rest);
   if (header.data_at_end)
     header_error(header.path, "samples at the end of a file must be raw and in one file");
-  const ScalarType type = header.type.type;
+  const ScalarType type = header.type;
   SampleLayout layout;
   layout.info = describe_volume(header.path, header.view.extent, type, header.transform, request);
   take_grid(header, layout.info);
@@ -248,8 +246,7 @@ std::unique_ptr<VolumeSource> open_text_volume(const TextHeader& header,
   const AfterEnd after_end = header.data_paths.size() > 1        ? AfterEnd::refused
                              : header.encoding == Encoding::text ? AfterEnd::noted_as_numbers
                                                                  : AfterEnd::noted;
-  return widen_source(make_stream_source(std::move(layout), std::move(stream), end, after_end),
-                      header.type.wide);
+  return make_stream_source(std::move(layout), std::move(stream), end, after_end);
 }
 
 namespace {
@@ -306,10 +303,10 @@ std::unique_ptr<VolumeSource> open_stdin(const VolumeRequest& request) {
   if (offset > std::numeric_limits<std::uint64_t>::max() / 2)
     throw UsageError(fmt::format("an offset of {} bytes is too large", offset));
   SampleLayout layout;
-  layout.info = describe_volume(name, header.view.extent, header.type.type, {}, request);
+  layout.info = describe_volume(name, header.view.extent, header.type, {}, request);
   layout.info.files.clear();
   layout.offset = offset;
-  layout.swap = must_swap(request.order.value_or(ByteOrder::little), header.type.type);
+  layout.swap = must_swap(request.order.value_or(ByteOrder::little), header.type);
   const std::uint64_t end = layout.end();
   return make_stream_source(std::move(layout), make_stdin_stream(), end);
 }

@@ -7,10 +7,11 @@
 #include <vector>
 
 #include <isobrick/array_view.h>
+#include <isobrick/sample_value.h>
+#include <isobrick/scalar.h>
 #include <isobrick/transform.h>
 #include <isobrick/vec.h>
 #include <isobrick/volume_request.h>
-#include "core/wide_type.h"
 #include "io/bytes/file.h"
 
 namespace isobrick::inline v0 {
@@ -27,11 +28,11 @@ struct TextHeader {
   bool data_at_end = false;             ///< instead: the samples are the end of the file
   Encoding encoding = Encoding::raw;
   ArrayView view;
-  StoredType type;
+  ScalarType type;
   std::optional<ByteOrder> order;
   Transform transform;
   std::string grid_class, grid_name;  ///< as VolumeInfo has them
-  std::optional<double> fill_value;
+  std::optional<SampleValue> fill_value;
   std::optional<LabelTable> labels;  ///< as VolumeInfo has them
 
   bool attached() const { return data_paths.front() == path; }

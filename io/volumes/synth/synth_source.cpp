@@ -60,9 +60,11 @@ class SynthSource final : public VolumeSource {
 
   void read(Box3 box, std::byte* out) override {
     if (box.empty()) return;
-    visit_scalar(options_.type, [&](auto tag) {
+    visit_sample(options_.type, [&](auto tag) {
       using T = typename decltype(tag)::type;
-      options_.kind == SynthKind::cells ? fill_labels<T>(box, out) : fill<T>(box, out);
+      if (options_.kind == SynthKind::cells) fill_labels<T>(box, out);
+      if constexpr (sizeof(T) < 8 || std::is_floating_point_v<T>)
+        if (options_.kind != SynthKind::cells) fill<T>(box, out);
     });
   }
 
@@ -104,7 +106,7 @@ class SynthSource final : public VolumeSource {
 /// Throws UsageError where the type has no room for the labels.
 void check_cells(const SynthOptions& options) {
   const double labels = SynthCells::max_label(options);
-  const double most = visit_scalar(options.type, [](auto tag) {
+  const double most = visit_sample(options.type, [](auto tag) {
     using Limits = std::numeric_limits<typename decltype(tag)::type>;
     return Limits::is_integer ? static_cast<double>(Limits::max())
                               : std::ldexp(1.0, Limits::digits);
@@ -131,7 +133,7 @@ std::optional<SynthKind> parse_synth_kind(std::string_view name) {
 }
 
 double default_isovalue(ScalarType type) {
-  return visit_scalar(type, [](auto tag) {
+  return visit_sample(type, [](auto tag) {
     using Limits = std::numeric_limits<typename decltype(tag)::type>;
     if constexpr (Limits::is_integer)
       return (static_cast<double>(Limits::lowest()) + static_cast<double>(Limits::max())) / 2;
@@ -154,7 +156,11 @@ std::unique_ptr<VolumeSource> make_synth(const SynthOptions& options) {
                                  *complete.frequency));
   if (!std::isfinite(options.noise) || options.noise < 0)
     throw UsageError("the noise is negative or not a number");
-  if (options.kind == SynthKind::cells) check_cells(complete);
+  if (options.kind == SynthKind::cells)
+    check_cells(complete);
+  else if (is_wide_integer(options.type))
+    throw UsageError(fmt::format("samples of type {} are labels, and {} has none: choose cells",
+                                 short_name(options.type), name_of(options.kind)));
   return std::make_unique<SynthSource>(complete);
 }
 

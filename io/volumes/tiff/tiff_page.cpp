@@ -43,19 +43,19 @@ bool get(TIFF* file, std::uint32_t tag, T& value) {
   return TIFFGetField(file, tag, &value) == 1;
 }
 
-StoredType read_type(const std::string& path, int bits, int format) {
+ScalarType read_type(const std::string& path, int bits, int format) {
   constexpr int kFloat = SAMPLEFORMAT_IEEEFP, kSigned = SAMPLEFORMAT_INT;
   if (format == kFloat && bits == 32) return ScalarType::f32;
   if (format == kFloat && bits == 64) return ScalarType::f64;
   if (format == kSigned && bits == 8) return ScalarType::i8;
   if (format == kSigned && bits == 16) return ScalarType::i16;
   if (format == kSigned && bits == 32) return ScalarType::i32;
-  if (format == kSigned && bits == 64) return WideType::i64;
+  if (format == kSigned && bits == 64) return ScalarType::i64;
   const bool plain = format == SAMPLEFORMAT_UINT || format == SAMPLEFORMAT_VOID;
   if (plain && bits == 8) return ScalarType::u8;
   if (plain && bits == 16) return ScalarType::u16;
   if (plain && bits == 32) return ScalarType::u32;
-  if (plain && bits == 64) return WideType::u64;
+  if (plain && bits == 64) return ScalarType::u64;
   throw UsageError(fmt::format("'{}': samples of {} bits (SampleFormat {}) are not supported", path,
                                bits, format));
 }
@@ -209,7 +209,7 @@ void TiffFile::read(std::uint32_t x0, std::uint32_t y0, std::uint32_t x1, std::u
 }
 
 void TiffFile::read_strips(const Window& window, const TiffPage& page, bool apart) {
-  const std::size_t size = size_of(page.type.type), step = apart ? 1 : page.samples;
+  const std::size_t size = size_of(page.type), step = apart ? 1 : page.samples;
   const std::uint32_t rows =
       std::clamp<std::uint32_t>(number(TIFFTAG_ROWSPERSTRIP, page.height), 1, page.height);
   const bool whole_rows = window.x0 == 0 && window.x1 == page.width && step == 1;
@@ -229,7 +229,7 @@ void TiffFile::read_strips(const Window& window, const TiffPage& page, bool apar
 }
 
 void TiffFile::read_tiles(const Window& window, const TiffPage& page, bool apart) {
-  const std::size_t size = size_of(page.type.type), step = apart ? 1 : page.samples;
+  const std::size_t size = size_of(page.type), step = apart ? 1 : page.samples;
   const std::uint32_t width = number(TIFFTAG_TILEWIDTH, 0), height = number(TIFFTAG_TILELENGTH, 0);
   if (width == 0 || height == 0 || std::size_t{width} * height * step * size > block_size_)
     fail("has tiles without a size");

@@ -4,7 +4,7 @@
 #include <memory>
 #include <string>
 
-#include "core/wide_type.h"
+#include <isobrick/scalar.h>
 
 struct tiff;
 
@@ -14,7 +14,7 @@ namespace isobrick::inline v0 {
 struct TiffPage {
   std::uint32_t width = 0, height = 0;
   std::uint16_t samples = 1;  ///< of a pixel
-  StoredType type;
+  ScalarType type;
 
   friend bool operator==(const TiffPage&, const TiffPage&) = default;
 };

@@ -12,7 +12,6 @@
 #include "io/volumes/raw/raw_source.h"
 #include "io/volumes/tiff/tiff_description.h"
 #include "io/volumes/tiff/tiff_page.h"
-#include "io/volumes/widened_source.h"
 
 namespace isobrick::inline v0 {
 namespace {
@@ -189,16 +188,15 @@ std::unique_ptr<VolumeSource> open_behind_first(const std::string& path, const P
                                  view.total / pages.page.width / pages.page.height));
   SampleLayout layout;
   layout.info = std::move(info);
-  layout.offset =
-      plain.offset + static_cast<std::uint64_t>(view.first) * size_of(pages.page.type.type);
-  layout.swap = plain.swap && size_of(pages.page.type.type) > 1;
+  layout.offset = plain.offset + static_cast<std::uint64_t>(view.first) * size_of(pages.page.type);
+  layout.swap = plain.swap && size_of(pages.page.type) > 1;
   layout.stride = view.stride;
   File input = open_input(path);
   const std::uint64_t size = input.size();
   if (plain.offset > size || size < layout.end())
     throw UsageError(fmt::format("'{}' has {} bytes, but its description promises samples up to {}",
                                  path, size, layout.end()));
-  return widen_source(make_raw_source(std::move(layout), std::move(input)), pages.page.type.wide);
+  return make_raw_source(std::move(layout), std::move(input));
 }
 
 }  // namespace
@@ -228,15 +226,13 @@ std::unique_ptr<VolumeSource> open_tiff(const std::string& name,
   }
   const ArrayView view = select_volume(name, axes, request.selection);
   VolumeInfo info =
-      describe_volume(name, view.extent, pages.page.type.type, read_transform(pages), request);
+      describe_volume(name, view.extent, pages.page.type, read_transform(pages), request);
   info.files.assign(files.begin(), files.end());
   if (behind) return open_behind_first(files[0], pages, view, std::move(info));
   const Index plane = Index{pages.page.width} * pages.page.height * pages.page.samples;
-  return widen_source(
-      std::make_unique<TiffSource>(std::move(info), files, pages.memory, std::move(pages.places),
-                                   view.first / plane, view.stride.z / plane,
-                                   static_cast<std::uint16_t>(view.first % pages.page.samples)),
-      pages.page.type.wide);
+  return std::make_unique<TiffSource>(std::move(info), files, pages.memory, std::move(pages.places),
+                                      view.first / plane, view.stride.z / plane,
+                                      static_cast<std::uint16_t>(view.first % pages.page.samples));
 }
 
 }  // namespace isobrick

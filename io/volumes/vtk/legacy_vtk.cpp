@@ -16,14 +16,13 @@
 #include "io/volumes/raw/raw_source.h"
 #include "io/volumes/raw/text_header.h"
 #include "io/volumes/stream_source.h"
-#include "io/volumes/widened_source.h"
 
 namespace isobrick::inline v0 {
 namespace {
 
 struct Header {
   ArrayView view;
-  StoredType type;
+  ScalarType type;
   Transform transform;
   bool text = false;
   bool fractions = false;  ///< the text holds u8 as fractions of 255
@@ -65,15 +64,15 @@ class FractionStream final : public ByteStream {
   std::unique_ptr<ByteStream> numbers_;
 };
 
-StoredType read_type(const std::string& path, const std::string& name) {
+ScalarType read_type(const std::string& path, const std::string& name) {
   // long is missing on purpose: it has 4 or 8 bytes, depending on who wrote it.
-  constexpr std::pair<std::string_view, StoredType> types[] = {
+  constexpr std::pair<std::string_view, ScalarType> types[] = {
       {"unsigned_char", ScalarType::u8}, {"char", ScalarType::i8},
       {"signed_char", ScalarType::i8},   {"unsigned_short", ScalarType::u16},
       {"short", ScalarType::i16},        {"unsigned_int", ScalarType::u32},
       {"int", ScalarType::i32},          {"float", ScalarType::f32},
-      {"double", ScalarType::f64},       {"vtktypeint64", WideType::i64},
-      {"vtktypeuint64", WideType::u64}};
+      {"double", ScalarType::f64},       {"vtktypeint64", ScalarType::i64},
+      {"vtktypeuint64", ScalarType::u64}};
   for (const auto& [known, type] : types)
     if (name == known) return type;
   header_error(path, fmt::format("samples of type '{}' are not supported", printable(name, 60)));
@@ -228,7 +227,7 @@ class Parser {
           count * 8 < rest.size() && rest[static_cast<std::size_t>(count * 8)] == '\n';
       return count * (wide ? 8 : 4);
     }
-    return count * size_of(read_type(path_, type).type);
+    return count * size_of(read_type(path_, type));
   }
 
   void finish() {
@@ -264,10 +263,9 @@ std::unique_ptr<VolumeSource> open_legacy_vtk(const std::string& path,
                                               const VolumeRequest& request) {
   refuse_raw_description(path, "a VTK file", request);
   const Header header = Parser(path, request.selection).parse();
-  const std::size_t sample = size_of(header.type.type);
+  const std::size_t sample = size_of(header.type);
   SampleLayout layout;
-  layout.info =
-      describe_volume(path, header.view.extent, header.type.type, header.transform, request);
+  layout.info = describe_volume(path, header.view.extent, header.type, header.transform, request);
   layout.offset = static_cast<std::uint64_t>(header.view.first) * sample;
   layout.stride = header.view.stride;
   File file = open_input(path);
@@ -276,14 +274,12 @@ std::unique_ptr<VolumeSource> open_legacy_vtk(const std::string& path,
     auto text = make_file_stream(std::move(file), header.begin);
     auto samples = header.fractions ? std::make_unique<FractionStream>(std::move(text))
                                     : make_text_stream(std::move(text), header.type);
-    return widen_source(
-        make_stream_source(std::move(layout), std::move(samples), total, AfterEnd::unread),
-        header.type.wide);
+    return make_stream_source(std::move(layout), std::move(samples), total, AfterEnd::unread);
   }
   layout.offset += header.begin;
   layout.swap = sample > 1 && kNativeOrder != ByteOrder::big;
   check_header_promise(layout, file);
-  return widen_source(make_raw_source(std::move(layout), std::move(file)), header.type.wide);
+  return make_raw_source(std::move(layout), std::move(file));
 }
 
 }  // namespace isobrick

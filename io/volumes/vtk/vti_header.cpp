@@ -139,11 +139,11 @@ Box3 read_extent(const std::string& path, const char* name, const std::string& t
   return box;
 }
 
-StoredType read_type(const std::string& path, const std::string& name) {
-  constexpr std::pair<std::string_view, StoredType> types[] = {
+ScalarType read_type(const std::string& path, const std::string& name) {
+  constexpr std::pair<std::string_view, ScalarType> types[] = {
       {"UInt8", ScalarType::u8},   {"Int8", ScalarType::i8},    {"UInt16", ScalarType::u16},
       {"Int16", ScalarType::i16},  {"UInt32", ScalarType::u32}, {"Int32", ScalarType::i32},
-      {"UInt64", WideType::u64},   {"Int64", WideType::i64},    {"Float32", ScalarType::f32},
+      {"UInt64", ScalarType::u64}, {"Int64", ScalarType::i64},  {"Float32", ScalarType::f32},
       {"Float64", ScalarType::f64}};
   for (const auto& [known, type] : types)
     if (name == known) return type;

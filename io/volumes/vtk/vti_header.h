@@ -3,9 +3,9 @@
 #include <string>
 
 #include <isobrick/array_view.h>
+#include <isobrick/scalar.h>
 #include <isobrick/selection.h>
 #include <isobrick/transform.h>
-#include "core/wide_type.h"
 #include "io/vtk/vtk_arrays.h"
 #include "io/vtk/vtk_file.h"
 
@@ -14,7 +14,7 @@ namespace isobrick::inline v0 {
 /// Describes one array of a VTK image file (`.vti`).
 struct VtiHeader {
   ArrayView view;
-  StoredType type;
+  ScalarType type;
   Transform transform;
   VtkArrayLayout array;
 };

@@ -7,7 +7,6 @@
 #include "io/volumes/raw/raw_source.h"
 #include "io/volumes/stream_source.h"
 #include "io/volumes/vtk/vti_header.h"
-#include "io/volumes/widened_source.h"
 
 namespace isobrick::inline v0 {
 
@@ -16,10 +15,9 @@ std::unique_ptr<VolumeSource> open_vti(const std::string& path, const std::strin
   refuse_raw_description(path, "a VTK image", request);
   const VtkFile vtk = vti_file(path);
   const VtiHeader header = parse_vti_header(vtk, array, request.selection);
-  const std::size_t sample = size_of(header.type.type);
+  const std::size_t sample = size_of(header.type);
   SampleLayout layout;
-  layout.info =
-      describe_volume(path, header.view.extent, header.type.type, header.transform, request);
+  layout.info = describe_volume(path, header.view.extent, header.type, header.transform, request);
   layout.offset = static_cast<std::uint64_t>(header.view.first) * sample;
   layout.stride = header.view.stride;
   layout.swap = sample > 1 && header.array.swap;
@@ -29,13 +27,12 @@ std::unique_ptr<VolumeSource> open_vti(const std::string& path, const std::strin
   if ((base64 || header.array.plain()) && numbers.bytes != total)
     vtk.fail(fmt::format("the array has {} bytes, but its extent makes {}", numbers.bytes, total));
   if (!header.array.plain())
-    return widen_source(make_stream_source(std::move(layout), std::move(numbers.stream), total,
-                                           base64 ? AfterEnd::unread : AfterEnd::refused),
-                        header.type.wide);
+    return make_stream_source(std::move(layout), std::move(numbers.stream), total,
+                              base64 ? AfterEnd::unread : AfterEnd::refused);
   layout.offset += header.array.first_number();
   File file = open_input(path);
   check_header_promise(layout, file);
-  return widen_source(make_raw_source(std::move(layout), std::move(file)), header.type.wide);
+  return make_raw_source(std::move(layout), std::move(file));
 }
 
 }  // namespace isobrick

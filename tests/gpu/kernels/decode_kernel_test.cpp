@@ -136,7 +136,7 @@ TEST_P(DecodeKernel, ComparesWithRanges) {
   });
 }
 
-INSTANTIATE_TEST_SUITE_P(Types, DecodeKernel, ::testing::ValuesIn(kScalarTypes),
+INSTANTIATE_TEST_SUITE_P(Types, DecodeKernel, ::testing::ValuesIn(kSurfaceTypes),
                          [](const auto& test) { return std::string(zarr_name(test.param)); });
 
 }  // namespace

@@ -38,12 +38,12 @@ TEST_F(MetaImageHeader, ReadsSamplesThroughEitherName) {
 }
 
 TEST_F(MetaImageHeader, Types) {
-  const std::pair<const char*, StoredType> types[] = {
-      {"MET_UCHAR", ScalarType::u8},     {"MET_CHAR", ScalarType::i8},
-      {"MET_USHORT", ScalarType::u16},   {"MET_SHORT", ScalarType::i16},
-      {"MET_UINT", ScalarType::u32},     {"MET_INT", ScalarType::i32},
-      {"MET_ULONG_LONG", WideType::u64}, {"MET_LONG_LONG", WideType::i64},
-      {"MET_FLOAT", ScalarType::f32},    {"MET_DOUBLE", ScalarType::f64}};
+  const std::pair<const char*, ScalarType> types[] = {
+      {"MET_UCHAR", ScalarType::u8},       {"MET_CHAR", ScalarType::i8},
+      {"MET_USHORT", ScalarType::u16},     {"MET_SHORT", ScalarType::i16},
+      {"MET_UINT", ScalarType::u32},       {"MET_INT", ScalarType::i32},
+      {"MET_ULONG_LONG", ScalarType::u64}, {"MET_LONG_LONG", ScalarType::i64},
+      {"MET_FLOAT", ScalarType::f32},      {"MET_DOUBLE", ScalarType::f64}};
   for (const auto& [name, type] : types) EXPECT_EQ(parse(with("MET_SHORT", name)).type, type);
   for (const char* name : {"MET_LONG", "MET_ULONG", "MET_UCHAR_ARRAY", "uint8", ""})
     refuse(with("MET_SHORT", name));

@@ -35,17 +35,17 @@ TEST_F(NrrdHeader, ReadsSamplesThroughEitherName) {
 }
 
 TEST_F(NrrdHeader, AllSpellingsOfTypes) {
-  const std::pair<StoredType, std::vector<const char*>> all[] = {
+  const std::pair<ScalarType, std::vector<const char*>> all[] = {
       {ScalarType::i8, {"signed char", "int8", "int8_t"}},
       {ScalarType::u8, {"uchar", "unsigned char", "uint8", "uint8_t", "UCHAR"}},
       {ScalarType::i16, {"short", "short int", "signed short", "signed short int", "int16"}},
       {ScalarType::u16, {"ushort", "unsigned short", "unsigned short int", "uint16_t"}},
       {ScalarType::i32, {"int", "signed int", "int32", "int32_t"}},
       {ScalarType::u32, {"uint", "unsigned int", "uint32", "uint32_t"}},
-      {WideType::i64,
+      {ScalarType::i64,
        {"longlong", "long long", "long long int", "signed long long", "signed long long int",
         "int64", "int64_t"}},
-      {WideType::u64,
+      {ScalarType::u64,
        {"ulonglong", "unsigned long long", "unsigned long long int", "uint64", "uint64_t"}},
       {ScalarType::f32, {"float"}},
       {ScalarType::f64, {"double"}},

@@ -77,7 +77,7 @@ TEST(SynthSource, GoldenBytes) {
         0xe5d2c2f743ef3394, 0xe5d2c2f743ef3394, 0x8fa62e75c162a617, 0x757dbccb19b798ed}},
   };
   for (const SynthKind kind : kKinds)
-    for (const ScalarType type : kScalarTypes)
+    for (const ScalarType type : kSurfaceTypes)
       EXPECT_EQ(fnv(whole(options(kind, type))), golden.at(kind)[static_cast<std::size_t>(type)])
           << name_of(kind) << " " << short_name(type) << std::hex << " 0x"
           << fnv(whole(options(kind, type)));

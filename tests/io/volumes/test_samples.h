@@ -24,7 +24,7 @@ T sample_at(Int3 p, Int3 extent) {
 /// The bytes of a box, in native or in the other byte order.
 inline std::string sample_bytes(ScalarType type, Box3 box, Int3 extent, bool swapped = false) {
   std::string bytes;
-  visit_scalar(type, [&](auto tag) {
+  visit_sample(type, [&](auto tag) {
     using T = typename decltype(tag)::type;
     for_each_point(box, [&](Int3 p) {
       const T v = sample_at<T>(p, extent);

@@ -21,7 +21,7 @@
 #include "tests/io/bytes/packed.h"
 #include "tests/io/bytes/temp_dir.h"
 
-// 64-bit integers, which become f64 without loss or are refused.
+// 64-bit integers, which stay what they are.
 namespace isobrick::inline v0 {
 namespace {
 
@@ -190,10 +190,11 @@ std::vector<Format> formats() {
   return all;
 }
 
-std::vector<double> read_doubles(VolumeSource& source, Box3 box) {
-  EXPECT_EQ(source.info().type, ScalarType::f64);
+/// The values; u64 as the same bits.
+std::vector<std::int64_t> read_integers(VolumeSource& source, Box3 box, bool is_signed) {
+  EXPECT_EQ(source.info().type, is_signed ? ScalarType::i64 : ScalarType::u64);
   const std::string bytes = read_box(source, box);
-  std::vector<double> values(bytes.size() / 8);
+  std::vector<std::int64_t> values(bytes.size() / 8);
   std::memcpy(values.data(), bytes.data(), bytes.size());
   return values;
 }
@@ -210,40 +211,67 @@ std::string refusal(const std::string& path, std::string_view part) {
   return {};
 }
 
-TEST(WideTypesOfFiles, BecomeDoubles) {
+TEST(WideTypesOfFiles, StayWhatTheyAre) {
   for (const Format& format : formats())
     for (const bool is_signed : {false, true}) {
       SCOPED_TRACE(format.name);
       const TempDir dir;
       Values values = kPlain;
-      if (is_signed) values[6] = -kLargest;
+      values[4] = std::numeric_limits<std::int64_t>::max();
+      values[6] = kLargest + 1;
+      values[10] = is_signed ? std::numeric_limits<std::int64_t>::min() : -1;  // the largest u64
       const auto source = open_source(format.write(dir, values, is_signed), {});
       ASSERT_EQ(source->info().extent, kSize);
-      EXPECT_EQ(read_doubles(*source, kAll), std::vector<double>(values.begin(), values.end()));
+      EXPECT_EQ(read_integers(*source, kAll, is_signed),
+                std::vector<std::int64_t>(values.begin(), values.end()));
       if (!source->random_access()) continue;
-      EXPECT_EQ(read_doubles(*source, {{1, 1, 0}, {3, 2, 2}}),
-                (std::vector<double>{static_cast<double>(values[4]), static_cast<double>(values[5]),
-                                     static_cast<double>(values[10]), 11}));
+      EXPECT_EQ(read_integers(*source, {{1, 1, 0}, {3, 2, 2}}, is_signed),
+                (std::vector<std::int64_t>{values[4], values[5], values[10], 11}));
     }
 }
 
-TEST(WideTypesOfFiles, WhatNoDoubleHoldsIsRefusedWithItsPlace) {
-  for (const Format& format : formats()) {
-    SCOPED_TRACE(format.name);
-    Values values = kPlain;
-    values[10] = kLargest + 1;
-    for (const bool is_signed : {false, true}) {
-      const TempDir dir;
-      const std::string message = refusal(format.write(dir, values, is_signed), "9007199254740993");
-      EXPECT_NE(message.find(dir / "v."), std::string::npos) << message;
-      EXPECT_NE(message.find("y = 1, z = 1"), std::string::npos) << message;
-    }
-    values[10] = -1;  // the largest u64
-    const TempDir dir;
-    refusal(format.write(dir, values, false), "18446744073709551615");
-    values[10] = std::numeric_limits<std::int64_t>::max();
-    refusal(format.write(dir, values, true), "9223372036854775807");
+TEST(WideTypesOfFiles, ValuesThatAreMissingNeedADouble) {
+  const TempDir dir;
+  VolumeRequest request;
+  request.nodata = 0;
+  const auto open = [&](const Values& values) {
+    return open_source(
+        dir.write("v.nrrd", nrrd(true, "encoding: raw\nendian: little") + stored_bytes(values)),
+        request);
+  };
+  const auto source = open(kPlain);
+  ASSERT_EQ(source->info().type, ScalarType::f64);
+  const std::string bytes = read_box(*source, kAll);
+  std::array<double, 12> read;
+  std::memcpy(read.data(), bytes.data(), bytes.size());
+  EXPECT_NE(read[0], read[0]);
+  EXPECT_EQ(read[9], 0x1p53);
+  Values values = kPlain;
+  values[10] = kLargest + 1;
+  try {
+    read_box(*open(values), kAll);
+    ADD_FAILURE() << "accepted";
+  } catch (const Error& error) {
+    EXPECT_NE(std::string(error.what()).find("9007199254740993"), std::string::npos);
   }
+}
+
+TEST(WideTypesOfFiles, FillValuesOfNrrdAreExact) {
+  const TempDir dir;
+  const auto fill_of = [&](bool is_signed, const std::string& fill) {
+    const std::string path = dir.write(
+        "v.nrrd",
+        nrrd(is_signed, "isobrick fill value:=" + fill + "\nencoding: raw\nendian: little") +
+            stored_bytes(kPlain));
+    return open_source(path, {})->info().fill_value.text();
+  };
+  EXPECT_EQ(fill_of(false, "18446744073709551615"), "18446744073709551615");
+  EXPECT_EQ(fill_of(true, "-9223372036854775808"), "-9223372036854775808");
+  for (const auto& [is_signed, fill] : {std::pair(false, "-1"),
+                                        {false, "18446744073709551616"},
+                                        {true, "9223372036854775808"},
+                                        {true, "0.5"}})
+    EXPECT_THROW(fill_of(is_signed, fill), UsageError) << fill;
 }
 
 TEST(WideTypesOfFiles, TextsBeyondTheType) {
@@ -259,14 +287,14 @@ TEST(WideTypesOfFiles, TextsBeyondTheType) {
   refusal(text(true, "9007199254740993.0"), "number");
   refusal(text(true, "0.5"), "number");
   const auto source = open_source(text(true, "-3.0"), {});
-  EXPECT_EQ(read_doubles(*source, kAll).back(), -3);
+  EXPECT_EQ(read_integers(*source, kAll, true).back(), -3);
 }
 
 TEST(WideTypesOfFiles, ATypeThatIsRequestedIsTaken) {
   const TempDir dir;
   dir.write("v.nhdr", nrrd(true, "encoding: raw\nendian: little\ndata file: v.raw"));
   const std::string path = dir.write("v.raw", stored_bytes(kPlain));
-  EXPECT_EQ(read_doubles(*open_source(path, {}), kAll)[3], 300);
+  EXPECT_EQ(read_integers(*open_source(path, {}), kAll, true)[3], 300);
   VolumeRequest request;
   request.type = ScalarType::f64;
   const auto source = open_source(path, request);
@@ -279,7 +307,11 @@ TEST(WideTypesOfFiles, NiftiScales) {
   put<float>(header, 112, 0.5F);
   put<float>(header, 116, -1);
   const auto source = open_source(dir.write("v.nii", header + stored_bytes(kPlain)), {});
-  EXPECT_EQ(read_doubles(*source, kAll)[3], 149);
+  ASSERT_EQ(source->info().type, ScalarType::f64);
+  const std::string bytes = read_box(*source, kAll);
+  double value = 0;
+  std::memcpy(&value, bytes.data() + 24, sizeof value);
+  EXPECT_EQ(value, 149);
 }
 
 }  // namespace

@@ -37,7 +37,7 @@ def check(state):
     for path in sorted(state.originals.glob("*.nii.gz")):
         image = nibabel.load(path)
         state.same(path.name, path, expected(image), image.affine)
-    kinds = ["u1", "i1", "i2", "u2", "i4", "u4", "f4", "f8"]
+    kinds = ["u1", "i1", "i2", "u2", "i4", "u4", "i8", "u8", "f4", "f8"]
     for version, kind, order, packed in itertools.product(
             (nibabel.Nifti1Image, nibabel.Nifti2Image), kinds, "<>", ("", ".gz")):
         header = version.header_class(endianness=order)

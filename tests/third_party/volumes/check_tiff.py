@@ -11,7 +11,7 @@ except ImportError as error:
     print(f"skipped: {error}")
     sys.exit(77)
 
-KINDS = ["u1", "i1", "i2", "u2", "i4", "u4", "f4", "f8"]
+KINDS = ["u1", "i1", "i2", "u2", "i4", "u4", "i8", "u8", "f4", "f8"]
 
 
 def compressions():

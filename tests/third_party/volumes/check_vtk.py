@@ -55,7 +55,7 @@ def write(image, path, **how):
 
 
 def check_xml(state):
-    kinds = ["u1", "i1", "i2", "u2", "i4", "u4", "f4", "f8"]
+    kinds = ["u1", "i1", "i2", "u2", "i4", "u4", "i8", "u8", "f4", "f8"]
     modes = {"raw": dict(SetDataModeToAppended=(), EncodeAppendedDataOff=()),
              "base64": dict(SetDataModeToAppended=(), EncodeAppendedDataOn=()),
              "inline": dict(SetDataModeToBinary=()), "ascii": dict(SetDataModeToAscii=())}
@@ -91,7 +91,7 @@ def check_xml(state):
 
 
 def check_legacy(state):
-    for kind, text in itertools.product(["u1", "i2", "u2", "i4", "u4", "f4", "f8"], (True, False)):
+    for kind, text in itertools.product(["u1", "i2", "u2", "i4", "u4", "i8", "u8", "f4", "f8"], (True, False)):
         image = make(pattern((9, 8, 7), kind))
         image.SetExtent(0, 6, 0, 7, 0, 8)
         name = f"{kind}_{'ascii' if text else 'binary'}.vtk"
