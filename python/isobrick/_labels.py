@@ -1,30 +1,10 @@
 """Meshes of the labels of arrays."""
 
-import numpy as np
-
 from ._arguments import box_of, label_options
-from ._errors import UsageError
 from ._mesh import meshes_of
 from ._progress import reporting
 from ._samples import Samples
 from ._volume import Volume
-
-
-class _Widened:
-    """64-bit integers as float64, which holds all up to 2⁵³."""
-
-    def __init__(self, array):
-        self._array = array
-        self.shape = array.shape
-        self.dtype = np.dtype("float64")
-        self.ndim = len(array.shape)
-
-    def __getitem__(self, index):
-        integers = np.asarray(self._array[index])
-        samples = integers.astype("float64")
-        if not np.array_equal(samples.astype(integers.dtype), integers):
-            raise UsageError("a label is beyond 2**53")
-        return samples
 
 
 def extract_labels(
@@ -41,7 +21,8 @@ def extract_labels(
     Parameters
     ----------
     array, spacing, origin, direction, unit, mask, nodata
-        As of `Extractor`: an array [z, y, x], also of 64-bit integers. Missing samples have no
+        As of `Extractor`: an array [z, y, x], also of 64-bit integers. Labels are integers of 63
+        bits, and where `mask` or `nodata` is given of 53 bits. Missing samples have no
         label. Or a `Volume`, of which only what follows counts.
     labels : int or list of int, optional
         None: all but `background`.
@@ -69,11 +50,9 @@ def extract_labels(
             labels, roi=roi, background=background, smooth=smooth, pass_band=pass_band,
             memory=memory, threads=threads, progress=progress,
         )
-    if np.dtype(getattr(array, "dtype", object)) in (np.dtype("int64"), np.dtype("uint64")):
-        array = _Widened(array)
     samples = Samples(
         array, spacing=spacing, origin=origin, direction=direction, unit=unit, mask=mask,
-        nodata=nodata,
+        nodata=nodata, wide=True,
     )
     options = label_options(
         labels, background=background, box=box_of(roi, samples.shape), smooth=smooth,

@@ -52,7 +52,7 @@ def source_path(source):
 
 
 def _sample_type(dtype):
-    native = check_dtype(dtype, "the file")
+    native = check_dtype(dtype, "the file", wide=True)
     return "uint8" if native == np.dtype("?") else native.name
 
 

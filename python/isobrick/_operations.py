@@ -99,7 +99,7 @@ def convert(source, path, *, progress=None, **options):
     if hasattr(source, "dtype") and hasattr(source, "shape"):
         check_names("convert", others, ARRAY_NAMES)
         with reporting(progress) as report:
-            return Samples(source, **others).convert(path_text(path), store, report)
+            return Samples(source, wide=True, **others).convert(path_text(path), store, report)
     check_names("convert", others, volume_request.__kwdefaults__)
     request = volume_request(memory=store.memory, threads=store.threads, **others)
     with reporting(progress) as report:
@@ -208,7 +208,7 @@ def synth(
     shape : three ints
         Samples along z, y, x.
     dtype : dtype
-        uint8 … float64.
+        uint8 … float64; of "cells" also uint64 and int64.
     seed, frequency, noise
         Of random numbers; periods along the longest edge; amplitude of a gyroid's noise.
     progress, and those of `convert` that concern the store

@@ -11,17 +11,22 @@ from ._blocks import BlockReader
 _TYPES = "uint8, int8, uint16, int16, uint32, int32, float32, float64 or bool"
 _SUPPORTED = {np.dtype(name) for name in
               ("u1", "i1", "u2", "i2", "u4", "i4", "f4", "f8", "?")}
+# Labels, of which no surfaces are made.
+_WIDE = {np.dtype("u8"), np.dtype("i8")}
 
 
 # What is known of an array besides its samples.
 ARRAY_NAMES = ("spacing", "origin", "direction", "unit", "mask", "nodata")
 
 
-def check_dtype(dtype, what="array"):
-    """The dtype in native byte order. Raises TypeError for one that is not supported."""
+def check_dtype(dtype, what="array", wide=False):
+    """The dtype in native byte order. Raises TypeError for one that is not supported.
+
+    `wide`: 64-bit integers are.
+    """
     dtype = np.dtype(dtype)
     native = dtype.newbyteorder("=")
-    if native not in _SUPPORTED:
+    if native not in _SUPPORTED and not (wide and native in _WIDE):
         advice = ""
         if dtype.kind in "iu":
             advice = "; if the values fit, use array.astype('int32')"
@@ -79,7 +84,7 @@ class Samples:
 
     def __init__(
         self, array, *, spacing=None, origin=None, direction=None, unit=None, mask=None,
-        nodata=None,
+        nodata=None, wide=False,
     ):
         if _is_xarray(array):
             array, spacing, origin, direction, unit = _of_xarray(
@@ -97,7 +102,7 @@ class Samples:
             )
         array = _in_memory_or_lazy(array)
         self.shape = _check_shape(array.shape)
-        self.dtype = check_dtype(array.dtype)
+        self.dtype = check_dtype(array.dtype, wide=wide)
         if isinstance(array, np.ndarray) and array.dtype != self.dtype:
             raise UsageError(
                 f"array has the byte order of another machine (dtype {array.dtype.str!r}); use "

@@ -12,7 +12,7 @@ constexpr Index kPartBytes = Index{16} << 20;
 }  // namespace
 
 ArraySource::ArraySource(const Volume& volume, const std::string& name, std::size_t memory)
-    : samples_(volume), memory_(memory) {
+    : samples_(volume, SampleUse::labels), memory_(memory) {
   info_.extent = volume.extent;
   info_.type = samples_.lattice.type;
   info_.transform = volume.transform;
@@ -47,7 +47,7 @@ void ArraySource::read_with_missing(Box3 box, std::byte* out) {
       raw.resize(static_cast<std::size_t>(volume(e) * bytes));
       samples_.read(part, raw.data());
       const SampleArray read{raw.data(), part, Int3{1, e.x, e.x * e.y} * bytes, samples_.read_type};
-      ArraySamples(info_.extent, read, samples_.missing).copy(part, out);
+      ArraySamples(info_.extent, read, samples_.missing, samples_.use).copy(part, out);
       out += static_cast<std::size_t>(volume(e)) * size_of(info_.type);
     }
 }

@@ -1,7 +1,9 @@
 #include "python/src/descriptions.h"
 
+#include <cmath>
 #include <string>
 
+#include <isobrick/sample_value.h>
 #include "python/src/casters.h"
 
 namespace isobrick::python {
@@ -27,6 +29,14 @@ py::dict describe_level(const LevelInfo& level) {
 
 }  // namespace
 
+/// A float where it is exact, else an int.
+py::object describe(const SampleValue& value) {
+  const double number = value;
+  if (value == number || std::isnan(number)) return py::float_(number);
+  if (const auto integer = value.as_signed()) return py::int_(*integer);
+  return py::int_(value.as_unsigned().value_or(0));
+}
+
 /// {label: {"name": …, "colour": …}}, None of what is no label image.
 py::object describe(const std::optional<LabelTable>& labels) {
   if (!labels) return py::none();
@@ -49,11 +59,11 @@ py::dict describe(const StoreInfo& info) {
   py::dict dict;
   dict["path"] = info.name;
   dict["shape"] = info.levels.front().lattice.extent;
-  dict["dtype"] = info.type;
+  dict["dtype"] = info.stored_type;
   add_transform(dict, info.levels.front().transform);
   dict["levels"] = levels;
   dict["codec"] = info.codec;
-  dict["fill_value"] = info.fill_value;
+  dict["fill_value"] = describe(info.fill_value);
   dict["grid_class"] = info.grid_class;
   dict["grid_name"] = info.grid_name;
   dict["labels"] = describe(info.labels);
@@ -69,7 +79,7 @@ py::dict describe(const VolumeInfo& info) {
   add_transform(dict, info.transform);
   dict["levels"] = py::list();
   dict["codec"] = py::none();
-  dict["fill_value"] = info.fill_value;
+  dict["fill_value"] = describe(info.fill_value);
   dict["grid_class"] = info.grid_class;
   dict["grid_name"] = info.grid_name;
   dict["labels"] = describe(info.labels);

@@ -171,7 +171,7 @@ py::dict estimate_mesh(const OpenedVolume& volume, const ExtractOptions& options
 }
 
 py::array read_samples(const OpenedVolume& volume, int level, Box3 box, int threads) {
-  const StoreReader& store = volume.store();
+  const StoreReader store = volume.store().native();
   const Int3 extent = level_of(store, level).lattice.extent;
   if (box.empty() || !(intersect(box, {{0, 0, 0}, extent}) == box))
     throw UsageError("the box of samples is empty or leaves the volume");

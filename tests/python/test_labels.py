@@ -52,6 +52,24 @@ def test_arrays_of_every_kind_give_the_same(cells, tmp_path):
         assert all(same(meshes[label], expected[label]) for label in expected)
 
 
+@pytest.mark.parametrize("dtype", ["uint64", "int64"])
+def test_labels_beyond_doubles(cells, dtype, tmp_path):
+    expected = isobrick.extract_labels(cells)
+    far = np.where(cells > 0, cells.astype(dtype) + 2**60, 0).astype(dtype)
+    path = tmp_path / "far.zarr"
+    isobrick.convert(far, path, brick=16, downsampling="mode")
+    volume = isobrick.open(path)
+    assert volume.dtype == far.dtype
+    assert np.array_equal(volume[:], far)
+    for source in (far, volume):
+        meshes = isobrick.extract_labels(source)
+        assert list(meshes) == [label + 2**60 for label in expected]
+        assert all(same(meshes[label + 2**60], expected[label]) for label in expected)
+        assert list(isobrick.extract_labels(source, [2**60 + 7])) == [2**60 + 7]
+    with pytest.raises(isobrick.Error, match="no float64"):
+        volume.extract(0.5)
+
+
 def test_lazy_arrays_are_read_by_blocks(cells):
     dask = pytest.importorskip("dask.array")
     expected = isobrick.extract_labels(cells, [3, 7])
@@ -84,8 +102,12 @@ def test_what_makes_no_sense_is_refused(cells):
         isobrick.extract_labels(cells, smooth=7)
     with pytest.raises(isobrick.Error, match="no label image"):
         isobrick.extract_labels(cells + np.float32(0.5))
-    with pytest.raises(ValueError, match="2..53"):
-        isobrick.extract_labels(np.full((4, 4, 4), 2**60 + 1))
+    with pytest.raises(isobrick.Error, match="18446744073709551615"):
+        isobrick.extract_labels(np.full((4, 4, 4), 2**64 - 1, "uint64"))
+    with pytest.raises(isobrick.Error, match="no float64"):
+        isobrick.extract_labels(np.full((4, 4, 4), 2**60 + 1), nodata=0)
+    with pytest.raises(ValueError, match="labels must be at most"):
+        isobrick.extract_labels(cells, 2**63)
 
 
 def test_label_images_are_known(tmp_path):
