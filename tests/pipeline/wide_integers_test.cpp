@@ -167,6 +167,11 @@ TYPED_TEST(WideIntegers, PyramidsByModeAndMean) {
   const fs::path path = this->folder_ / "mean.zarr";
   convert(source, path, {.levels = 2});
   EXPECT_EQ(samples_of<T>(StoreReader(path), 1), std::vector<T>(2, static_cast<T>(most - 1)));
+  std::vector<T> half(16, most);
+  std::fill_n(half.begin(), 8, T{0});  // of each eight, four
+  MemorySource halves({4, 2, 2}, scalar_type_of<T>, as_bytes(half));
+  convert(halves, path, {.levels = 2, .force = true});
+  EXPECT_EQ(samples_of<T>(StoreReader(path), 1), std::vector<T>(2, static_cast<T>(most / 2 + 1)));
 }
 
 TYPED_TEST(WideIntegers, MeshesAreThoseOfSmallLabels) {
