@@ -236,6 +236,12 @@ TYPED_TEST(WideIntegers, ListsTellNeighboursInWholeBricksApart) {
   const StoreReader store = this->store(field, 64);
   const auto expected = this->meshes_of(store);
   ASSERT_EQ(expected.size(), 2u);
+  // As the background one hides none of the other's whole blocks.
+  for (const auto& [label, mesh] : expected) {
+    const auto other = this->meshes_of(store, {.background = label});
+    ASSERT_EQ(other.size(), 1u);
+    EXPECT_EQ(other.begin()->second, expected.at(other.begin()->first));
+  }
   add_label_index(store.storage()->local_path(), {});
   const StoreReader listed(store.storage()->local_path());
   for (const auto& [label, mesh] : expected)
