@@ -74,6 +74,22 @@ MeshBytes predict_bytes(const MeshForm& form, MeshSize size) {
   return {};
 }
 
+std::uint64_t predict_label_bytes(const MeshForm& form, const MeshFilterOptions& filter,
+                                  const LabelTotals& totals, int at_a_time) {
+  const auto scratch_of = [&](MeshSize size) {
+    const MeshBytes bytes = predict_bytes(form, size);
+    return bytes.needed - bytes.file + filter_scratch_bytes(filter, size, form.normals);
+  };
+  // Shards have their headers once; each label has a manifest in them and a line in the list.
+  const std::uint64_t header = predict_bytes(form, {}).file,
+                      each = form.sharded ? std::uint64_t{512} : header;
+  const std::uint64_t files = predict_bytes(form, totals.size).file +
+                              each * (totals.labels - std::min<std::uint64_t>(totals.labels, 1));
+  // No more at a time than all of them, and none larger than the largest.
+  return files + std::min(static_cast<std::uint64_t>(at_a_time) * scratch_of(totals.largest),
+                          scratch_of(totals.size));
+}
+
 std::uint64_t free_space(const fs::path& path) {
   const fs::path folder = path.parent_path().empty() ? fs::path(".") : path.parent_path();
   std::error_code failure;

@@ -202,6 +202,24 @@ TEST(Space, WhatIsUncertainNeedsMore) {
   EXPECT_NEAR(static_cast<double>(needed()), 1.25 * static_cast<double>(sure), 1000);
 }
 
+TEST(Space, MeshesOfLabelsHaveHeadersAndScratchFilesOfThoseAtATime) {
+  const MeshForm ply{.format = MeshFormat::ply};
+  const MeshSize size{.vertices = 500'000, .triangles = 1'000'000};
+  const auto bytes = [&](std::uint64_t labels, MeshSize largest, int at_a_time) {
+    return predict_label_bytes(ply, {}, {labels, size, largest}, at_a_time);
+  };
+  const MeshBytes whole = predict_bytes(ply, size);
+  const MeshSize some{.vertices = 1000, .triangles = 2000};
+  EXPECT_EQ(bytes(1, size, 1), whole.needed);
+  EXPECT_EQ(bytes(1, size, 8), whole.needed);
+  EXPECT_EQ(bytes(100, some, 0), whole.file + 99 * predict_bytes(ply, {}).file);
+  EXPECT_EQ(bytes(100, some, 3), bytes(100, some, 0) + 3 * 2000 * 13);
+  MeshFilterOptions filter;
+  filter.simplify_ratio = 0.5;
+  EXPECT_EQ(predict_label_bytes(ply, filter, {100, size, some}, 3),
+            bytes(100, some, 3) + 3 * filter_scratch_bytes(filter, some, false));
+}
+
 TEST(Progress, LineHasRateAndTimeLeft) {
   EXPECT_EQ(progress_line("convert", 50 << 20, 100 << 20, 2, 80),
             "convert  50% [############............] 25.0 MiB/s, 2 s left");
