@@ -124,6 +124,7 @@ class LabelWriter {
     filter_.threads = 1;
     if (has_levels(format_))
       levels_ = open_level_folder(folder_, {.as_tiles = format_ == MeshFormat::tiles3d,
+                                            .compress = output.compress,
                                             .sharded = output.sharded,
                                             .has_labels = true});
   }
@@ -253,10 +254,12 @@ void check_label_output(const LabelOutput& output) {
     throw UsageError("PVTP has several files for a mesh; choose another --format for labels");
   if (output.quantize && output.format != MeshFormat::glb)
     throw UsageError("--quantize is for GLB only: add --format glb");
-  if (output.compress && output.format != MeshFormat::glb)
-    throw UsageError("--compress is for GLB only: add --format glb");
-  check_levels(
-      {.format = output.mesh_format(), .levels = output.levels, .sharded = output.sharded});
+  const MeshForm form{.format = output.mesh_format(),
+                      .compress = output.compress,
+                      .levels = output.levels,
+                      .sharded = output.sharded};
+  check_compression(form);
+  check_levels(form);
 }
 
 void check_label_folder(const LabelOutput& output) {

@@ -65,9 +65,10 @@ MeshBytes predict_bytes(const MeshForm& form, MeshSize size) {
     }
     case MeshFormat::tiles3d: {
       // Cuts at tiles add about a tenth, coarser levels a third, and a tile's JSON two bytes a
-      // triangle. Scratch files as above.
+      // triangle. Scratch files as above; compressed as GLB is.
       const std::uint64_t mesh = rows + t * triangle;
-      const std::uint64_t file = header + (mesh * 11 / 10 + 2 * t) * 4 / 3;
+      const std::uint64_t stored = form.compress ? v * (6 + (vectors - 1) * 10) + 2 * t : mesh;
+      const std::uint64_t file = header + (stored * 11 / 10 + 2 * t) * 4 / 3;
       return {file, file + 2 * mesh + 2 * t * triangle + v * 24};
     }
   }

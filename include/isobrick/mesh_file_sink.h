@@ -42,8 +42,8 @@ inline constexpr int kMaxMeshLevels = 16;
 struct MeshFileOptions {
   std::optional<MeshFormat> format = {};  ///< nullopt: by the name's extension
   bool quantize = false;                  ///< GLB: 16 bits a number (KHR_mesh_quantization)
-  /// GLB: compressed without loss (EXT_meshopt_compression), beside `quantize` or alone. Throws
-  /// UsageError in a build without meshoptimizer.
+  /// GLB, beside `quantize` or alone, and 3D Tiles: compressed without loss
+  /// (EXT_meshopt_compression). Throws UsageError in a build without meshoptimizer.
   bool compress = false;
   /// Of formats with levels of detail: how many at most, 1 to kMaxMeshLevels. Each has a quarter of
   /// the triangles of the one before. 0: until one part has the whole mesh.

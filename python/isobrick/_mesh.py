@@ -148,7 +148,7 @@ class Mesh:
         quantize : bool
             GLB only: 16 bits a coordinate.
         compress : bool
-            GLB only: compressed without loss (EXT_meshopt_compression).
+            GLB and 3D Tiles: compressed without loss (EXT_meshopt_compression).
         levels : int, optional
             neuroglancer and 3D Tiles only: levels of detail at most; by default until one part has
             the whole mesh.

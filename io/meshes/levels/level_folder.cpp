@@ -45,7 +45,8 @@ class LevelMesh final : public LevelSink {
 
 std::unique_ptr<LevelFolder> open_level_folder(const fs::path& folder,
                                                const LevelFolderOptions& options) {
-  if (options.as_tiles) return std::make_unique<TilesFolder>(folder, options.has_labels);
+  if (options.as_tiles)
+    return std::make_unique<TilesFolder>(folder, options.has_labels, options.compress);
   return std::make_unique<NeuroglancerFolder>(folder, options.sharded);
 }
 
