@@ -17,6 +17,8 @@ MeshBytes predict_bytes(const MeshForm& form, MeshSize size) {
   const std::uint64_t vectors = form.normals ? 2 : 1, v = size.vertices, t = size.triangles;
   const std::uint64_t attributes = v * form.attributes * sizeof(float);
   const std::uint64_t rows = v * vectors * vector + attributes;
+  // A triangle in scratch files.
+  const std::uint64_t numbers = v > kMaxNarrowVertices ? sizeof(WideTriangle) : triangle;
   // What waits in scratch files is on the disk twice for a moment.
   switch (form.format) {
     case MeshFormat::stl: return {header + t * 50, header + t * 50};
@@ -60,8 +62,8 @@ MeshBytes predict_bytes(const MeshForm& form, MeshSize size) {
     case MeshFormat::neuroglancer: {
       // A triangle takes about 2.5 bytes, and all coarser levels a third of level 0. Scratch files
       // hold the mesh, its simplification and sorted triangles.
-      const std::uint64_t file = header + t * 10 / 3, mesh = v * vector + t * triangle;
-      return {file, 2 * file + 2 * mesh + 2 * t * triangle + v * 24};
+      const std::uint64_t file = header + t * 10 / 3, mesh = v * vector + t * numbers;
+      return {file, 2 * file + 2 * mesh + 2 * t * numbers + v * 24};
     }
     case MeshFormat::tiles3d: {
       // Cuts at tiles add about a tenth, coarser levels a third, and a tile's JSON two bytes a
@@ -69,7 +71,7 @@ MeshBytes predict_bytes(const MeshForm& form, MeshSize size) {
       const std::uint64_t mesh = rows + t * triangle;
       const std::uint64_t stored = form.compress ? v * (6 + (vectors - 1) * 10) + 2 * t : mesh;
       const std::uint64_t file = header + (stored * 11 / 10 + 2 * t) * 4 / 3;
-      return {file, file + 2 * mesh + 2 * t * triangle + v * 24};
+      return {file, file + 2 * (rows + t * numbers) + 2 * t * numbers + v * 24};
     }
   }
   return {};
@@ -124,7 +126,7 @@ std::optional<Shortage> find_shortage(
 }
 
 bool needs_pieces(const PlannedMesh& mesh, std::uint64_t max_narrow) {
-  return takes_wide(mesh.form.format) && !mesh.filter.changes_mesh() && !mesh.filter.measure &&
+  return (takes_wide(mesh.form.format) || mesh.filter.makes_smaller()) &&
          static_cast<double>(mesh.size.vertices) * (1 + mesh.uncertainty) >
              static_cast<double>(max_narrow);
 }

@@ -49,7 +49,8 @@ std::optional<Shortage> find_shortage(
     const std::function<std::uint64_t(const std::filesystem::path&)>& free_space);
 
 /// Whether a mesh may have more vertices than `max_narrow`, which an extraction can number at once,
-/// and can be written all the same: by way of pieces.
+/// and can be written all the same: by way of pieces, in a format without a limit or where a filter
+/// makes it smaller.
 bool needs_pieces(const PlannedMesh& mesh, std::uint64_t max_narrow);
 
 }  // namespace isobrick::tools

@@ -29,8 +29,8 @@ ISOBRICK_API bool has_normals(MeshFormat format);
 ISOBRICK_API bool has_vertices(MeshFormat format);
 /// Whether it holds MeshChunk::attributes: PLY, GLB, VTP and PVTP do. Others ignore them.
 ISOBRICK_API bool has_attributes(MeshFormat format);
-/// Whether it holds meshes of more vertices than 32 bits number (MeshHeader::wide): OBJ, GLB, VTP
-/// and PVTP do.
+/// Whether it holds meshes of more vertices than 32 bits number (MeshHeader::wide): all but PLY and
+/// STL do.
 ISOBRICK_API bool takes_wide(MeshFormat format);
 /// Whether it is a folder with the mesh at several levels of detail: neuroglancer and 3D Tiles are.
 ISOBRICK_API bool has_levels(MeshFormat format);

@@ -90,7 +90,7 @@ bool has_vertices(MeshFormat format) { return format != MeshFormat::stl; }
 
 bool takes_wide(MeshFormat format) {
   return format == MeshFormat::obj || format == MeshFormat::glb || format == MeshFormat::vtp ||
-         format == MeshFormat::pvtp;
+         format == MeshFormat::pvtp || has_levels(format);
 }
 
 bool has_attributes(MeshFormat format) {

@@ -148,10 +148,16 @@ TEST(Mesh, ItIsMadeOfPiecesWhereAnExtractionCannotNumberIt) {
   PlannedMesh ply = mesh, smooth = mesh, metres = mesh;
   ply.form.format = MeshFormat::ply;
   EXPECT_FALSE(needs_pieces(ply, 1000));
-  smooth.filter.smooth = 3;
-  EXPECT_FALSE(needs_pieces(smooth, 1000));
+  for (PlannedMesh* each : {&ply, &smooth}) each->filter.smooth = 3;
+  EXPECT_TRUE(needs_pieces(smooth, 1000));
+  EXPECT_FALSE(needs_pieces(ply, 1000));
   metres.filter.unit = "meter";
+  metres.filter.measure = true;
+  metres.form.format = MeshFormat::tiles3d;
   EXPECT_TRUE(needs_pieces(metres, 1000));
+  // What is left may have numbers of 32 bits.
+  ply.filter.largest = 1;
+  EXPECT_TRUE(needs_pieces(ply, 1000));
 }
 
 TEST(Space, AMeshNeedsItsScratchFileToo) {

@@ -22,6 +22,7 @@ class LevelMesh final : public LevelSink {
         mesh_(folder_->add_mesh(kOnlyMesh, options, {.name = output_.path().stem().string()})) {}
 
   Indexing indexing() const override { return mesh_->indexing(); }
+  bool takes_wide() const override { return mesh_->takes_wide(); }
   void begin(const MeshHeader& header) override { mesh_->begin(header); }
   void write(const MeshChunk& chunk) override { mesh_->write(chunk); }
   void finish() override {
