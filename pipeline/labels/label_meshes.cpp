@@ -84,7 +84,7 @@ void LabelMeshes::pass_on(const std::vector<LabelChain>& chains, const LabelVisi
       },
       [&](std::size_t& i) {
         visit(SpooledLabelMesh(spool_, chains[i], i, image_.transform, header_of(chains[i]),
-                               plan_.cancel));
+                               plan_.cancel, plan_.max_narrow_vertices));
       },
       [&](std::size_t& i) { progress.advance(2 * chains[i].quads * sizeof(Triangle)); });
   progress.end();

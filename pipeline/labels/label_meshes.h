@@ -26,6 +26,7 @@ class LabelMeshes {
     std::size_t at_a_time = 1;      ///< meshes that are passed on
     std::stop_token cancel = {};
     std::function<void(const LabelTotals&)> check_totals = {};  ///< of LabelOptions
+    std::uint64_t max_narrow_vertices = kMaxNarrowVertices;     ///< a test has fewer
   };
 
   /// `image` must outlive it.
