@@ -70,6 +70,11 @@ TEST_F(CompressedTiles, HoldTheSameNumbersInTheSameTiles) {
       EXPECT_EQ(scene["nodes"], scene_of(before)["nodes"]);
       EXPECT_EQ(scene["accessors"][0]["max"], scene_of(before)["accessors"][0]["max"]);
       EXPECT_EQ(scene["bufferViews"].size(), has_normals ? 3U : 2U);
+      EXPECT_EQ(after.size() % 4, 0U);
+      for (const json& view : scene["bufferViews"]) {
+        const json& packed = view["extensions"]["EXT_meshopt_compression"];
+        EXPECT_EQ(packed["byteOffset"].get<std::size_t>() % 4, 0U);
+      }
       EXPECT_EQ(turned(other), turned(entry.path()));
     }
     EXPECT_GT(contents, 8);
