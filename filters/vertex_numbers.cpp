@@ -6,17 +6,13 @@
 
 namespace isobrick::inline v0 {
 
-template <>
-void check_vertex_count<std::uint32_t>(std::uint64_t vertices) {
+void check_narrow_count(std::uint64_t vertices) {
   // The largest number is left for what stands for none.
   if (vertices > kMaxNarrowVertices)
     throw Error(
         "the mesh has more than 4294967295 vertices, which filters of meshes cannot number; "
         "extract parts with --roi, or a coarser --level");
 }
-
-template <>
-void check_vertex_count<std::uint64_t>(std::uint64_t) {}
 
 void check_takes(const MeshSink& to, bool wide, std::uint64_t vertices) {
   if (wide && !to.takes_wide())

@@ -20,9 +20,14 @@ using TriangleOf = std::array<Number, 3>;
 template <class Number>
 inline constexpr bool kIsWide = std::is_same_v<Number, std::uint64_t>;
 
+/// Throws Error for more than kMaxNarrowVertices.
+void check_narrow_count(std::uint64_t vertices);
+
 /// Throws Error where a mesh has more vertices than numbers can name.
 template <class Number>
-void check_vertex_count(std::uint64_t vertices);
+void check_vertex_count(std::uint64_t vertices) {
+  if constexpr (!kIsWide<Number>) check_narrow_count(vertices);
+}
 
 /// Throws Error where a filtered mesh has too many vertices for the sink that it goes to, which has
 /// not begun. `wide`: MeshHeader::wide.
