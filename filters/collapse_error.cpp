@@ -45,7 +45,7 @@ double square_to(Vec3d p, Vec3d a, Vec3d b, Vec3d c) {
 double collapse_error(const TriangleGroup& group, std::span<const std::uint32_t> final_vertices,
                       std::span<const Triangle> left) {
   constexpr double unknown = std::numeric_limits<double>::infinity();
-  const Fans fans(group.vertices.size(), left);
+  const Fans fans(group.vertices, left);
   const auto at = [&](std::uint32_t v) {
     return to_double(group.positions[v]) - to_double(group.positions.front());
   };
@@ -69,7 +69,7 @@ double collapse_error(const TriangleGroup& group, std::span<const std::uint32_t>
     }
     return least;
   };
-  std::vector<double> of_vertex(group.vertices.size(), unknown);
+  std::vector<double> of_vertex(group.vertices, unknown);
   for (const Triangle& t : group.triangles) {
     const Triangle image{final_vertices[t[0]], final_vertices[t[1]], final_vertices[t[2]]};
     if (image == t) continue;

@@ -6,38 +6,47 @@
 
 namespace isobrick::inline v0 {
 
-ComponentStage::ComponentStage(MeshSink& next, std::stop_token cancel, const ScratchPlace& place,
-                               std::uint64_t memory, const ComponentChoice& choice)
+template <class Number>
+ComponentStage<Number>::ComponentStage(MeshSink& next, std::stop_token cancel,
+                                       const ScratchPlace& place, std::uint64_t memory,
+                                       const ComponentChoice& choice,
+                                       std::uint64_t max_narrow_vertices)
     : FilterStage(next, std::move(cancel)),
       choice_(choice),
+      max_narrow_vertices_(max_narrow_vertices),
       spool_(place, memory / 8 * 3),
       sets_(place, memory / 4),
       sizes_(place, memory / 8),
       numbers_(place, memory / 4) {}
 
-void ComponentStage::begin(const MeshHeader& header) {
+template <class Number>
+void ComponentStage<Number>::begin(const MeshHeader& header) {
   spool_.begin(header);
-  next().begin(header);
+  header_ = header;
+  if constexpr (!kIsWide<Number>) begin_next();
 }
 
-void ComponentStage::write(const MeshChunk& chunk) {
+template <class Number>
+void ComponentStage<Number>::write(const MeshChunk& chunk) {
   check_cancelled();
   spool_.append(chunk);
   sets_.grow(spool_.size().vertices);
-  for (const Triangle& triangle : chunk.triangles) sets_.connect(triangle);
+  for (const auto& triangle : triangles_of<Number>(chunk, converted_)) sets_.connect(triangle);
 }
 
-void ComponentStage::count_triangles() {
+template <class Number>
+void ComponentStage<Number>::count_triangles() {
   sets_.flatten();
   sizes_.resize(sets_.size());
-  spool_.triangles().for_each_run([&](std::span<const Triangle> run, std::uint64_t) {
+  spool_.triangles().for_each_run([&](std::span<const TriangleOf<Number>> run, std::uint64_t) {
     check_cancelled();
-    for (const Triangle& triangle : run) ++sizes_.edit(sets_.root(triangle[0]));
+    for (const auto& triangle : run) ++sizes_.edit(sets_.root(triangle[0]));
   });
 }
 
+template <class Number>
 template <class F>
-void ComponentStage::for_each_component(F&& f) {
+void ComponentStage<Number>::for_each_component(F&& f) {
   for (std::uint64_t v = 0; v < sets_.size(); ++v) {
     if (v % (1 << 16) == 0) check_cancelled();
     if (sets_.root(v) != v) continue;
@@ -50,7 +59,8 @@ void ComponentStage::for_each_component(F&& f) {
 
 /// Counts sizes by their digits of 16 bits, the highest first: three passes, whatever the number of
 /// components.
-ComponentStage::Threshold ComponentStage::find_threshold() {
+template <class Number>
+typename ComponentStage<Number>::Threshold ComponentStage<Number>::find_threshold() {
   if (choice_.largest == 0 || choice_.largest >= sets_.sets()) return {};
   constexpr int digit_bits = 16;
   Threshold threshold{.equal = choice_.largest};
@@ -68,7 +78,8 @@ ComponentStage::Threshold ComponentStage::find_threshold() {
   return threshold;
 }
 
-void ComponentStage::choose() {
+template <class Number>
+void ComponentStage<Number>::choose() {
   Threshold threshold = find_threshold();
   const bool all = threshold.triangles == 0;
   for_each_component([&](std::uint64_t& size) {
@@ -81,17 +92,27 @@ void ComponentStage::choose() {
   });
 }
 
-void ComponentStage::number_vertices() {
+template <class Number>
+void ComponentStage<Number>::number_vertices() {
   numbers_.resize(sets_.size());
   for (std::uint64_t v = 0; v < sets_.size(); ++v) {
     if (v % (1 << 16) == 0) check_cancelled();
-    const std::uint32_t root = sets_.root(v);
-    if (root == VertexSets::kNone || sizes_[root] == 0) continue;
-    numbers_.edit(v) = static_cast<std::uint32_t>(++kept_vertices_);
+    const Number root = sets_.root(v);
+    if (root == VertexSets<Number>::kNone || sizes_[root] == 0) continue;
+    numbers_.edit(v) = static_cast<Number>(++kept_vertices_);
   }
 }
 
-void ComponentStage::write_vertices() {
+/// With numbers of 64 bits it is not known before how many vertices stay.
+template <class Number>
+void ComponentStage<Number>::begin_next() {
+  header_.wide = kept_vertices_ > max_narrow_vertices_;
+  check_takes(next(), header_.wide, kept_vertices_);
+  next().begin(header_);
+}
+
+template <class Number>
+void ComponentStage<Number>::write_vertices() {
   std::vector<Vec3f> positions, normals;
   std::uint64_t first_vertex = 0;
   spool_.positions().for_each_run([&](std::span<const Vec3f> run, std::uint64_t first) {
@@ -109,30 +130,37 @@ void ComponentStage::write_vertices() {
   });
 }
 
-void ComponentStage::write_triangles() {
-  std::vector<Triangle> kept;
-  spool_.triangles().for_each_run([&](std::span<const Triangle> run, std::uint64_t) {
+template <class Number>
+void ComponentStage<Number>::write_triangles() {
+  std::vector<TriangleOf<Number>> kept;
+  spool_.triangles().for_each_run([&](std::span<const TriangleOf<Number>> run, std::uint64_t) {
     check_cancelled();
     kept.clear();
-    for (const Triangle& t : run) {
-      const std::uint32_t a = numbers_[t[0]];
+    for (const auto& t : run) {
+      const Number a = numbers_[t[0]];
       if (a != 0) kept.push_back({a - 1, numbers_[t[1]] - 1, numbers_[t[2]] - 1});
     }
-    if (!kept.empty()) next().write({.first_vertex = kept_vertices_, .triangles = kept});
+    if (!kept.empty())
+      isobrick::write_triangles<Number>(next(), header_.wide, kept_vertices_, kept);
   });
 }
 
-void ComponentStage::finish() {
+template <class Number>
+void ComponentStage<Number>::finish() {
   count_triangles();
   choose();
   number_vertices();
   sets_.release();
   sizes_.release();
+  if constexpr (kIsWide<Number>) begin_next();
   write_vertices();
   write_triangles();
   spool_.release();
   numbers_.release();
   next().finish();
 }
+
+template class ComponentStage<std::uint32_t>;
+template class ComponentStage<std::uint64_t>;
 
 }  // namespace isobrick

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <vector>
 
 #include "filters/filter_stage.h"
 #include "filters/mesh_spool.h"
@@ -16,11 +17,15 @@ struct ComponentChoice {
 
 /// Passes on the chosen components of a mesh, their vertices and triangles in the order that they
 /// had. Vertices that no triangle names are dropped.
+template <class Number>
 class ComponentStage final : public FilterStage {
  public:
   ComponentStage(MeshSink& next, std::stop_token cancel, const ScratchPlace& place,
-                 std::uint64_t memory, const ComponentChoice& choice);
+                 std::uint64_t memory, const ComponentChoice& choice,
+                 std::uint64_t max_narrow_vertices = kMaxNarrowVertices);
 
+  /// What stays may be small enough for any sink.
+  bool takes_wide() const override { return true; }
   void begin(const MeshHeader& header) override;
   void write(const MeshChunk& chunk) override;
   void finish() override;
@@ -42,15 +47,19 @@ class ComponentStage final : public FilterStage {
   Threshold find_threshold();
   void choose();
   void number_vertices();
+  void begin_next();
   void write_vertices();
   void write_triangles();
 
   ComponentChoice choice_;
-  MeshSpool spool_;
-  VertexSets sets_;
-  ScratchArray<std::uint64_t> sizes_;    ///< triangles of a component, at its first vertex
-  ScratchArray<std::uint32_t> numbers_;  ///< 1 more than the new one of a vertex, or 0: it goes
+  std::uint64_t max_narrow_vertices_;
+  MeshHeader header_;  ///< of the mesh that leaves
+  MeshSpool<Number> spool_;
+  VertexSets<Number> sets_;
+  ScratchArray<std::uint64_t> sizes_;  ///< triangles of a component, at its first vertex
+  ScratchArray<Number> numbers_;       ///< 1 more than the new one of a vertex, or 0: it goes
   std::uint64_t kept_vertices_ = 0;
+  std::vector<TriangleOf<Number>> converted_;  ///< of a chunk
 };
 
 }  // namespace isobrick

@@ -263,7 +263,7 @@ std::vector<Collapse> EdgeCollapse::run(std::size_t least) {
 
 std::vector<std::uint32_t> final_vertices(const TriangleGroup& group,
                                           std::span<const Collapse> collapses) {
-  std::vector<std::uint32_t> last(group.vertices.size());
+  std::vector<std::uint32_t> last(group.vertices);
   for (std::uint32_t v = 0; v < last.size(); ++v) last[v] = v;
   // Where a vertex goes later, those that went to it before go too.
   for (std::size_t i = collapses.size(); i-- > 0;) last[collapses[i].from] = last[collapses[i].to];

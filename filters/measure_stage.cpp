@@ -5,23 +5,25 @@
 #include <utility>
 
 #include "core/vectors.h"
-#include "filters/mesh_spool.h"
 
 namespace isobrick::inline v0 {
 
-MeasureStage::MeasureStage(MeshSink& next, std::stop_token cancel, const ScratchPlace& place,
-                           std::uint64_t memory)
+template <class Number>
+MeasureStage<Number>::MeasureStage(MeshSink& next, std::stop_token cancel,
+                                   const ScratchPlace& place, std::uint64_t memory)
     : FilterStage(next, std::move(cancel)),
       positions_(place, memory / 2),
       sets_(place, memory / 4),
       sides_(place, memory / 4) {}
 
-void MeasureStage::begin(const MeshHeader& header) {
+template <class Number>
+void MeasureStage<Number>::begin(const MeshHeader& header) {
   measure_.unit = header.unit;
   next().begin(header);
 }
 
-void MeasureStage::include(Vec3d p) {
+template <class Number>
+void MeasureStage<Number>::include(Vec3d p) {
   if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z)) return;
   if (!measure_.bounds) measure_.bounds = MeshBounds{p, p};
   for (int axis = 0; axis < 3; ++axis) {
@@ -30,7 +32,8 @@ void MeasureStage::include(Vec3d p) {
   }
 }
 
-void MeasureStage::add(const Triangle& triangle, const MeshChunk& chunk) {
+template <class Number>
+void MeasureStage<Number>::add(const TriangleOf<Number>& triangle, const MeshChunk& chunk) {
   Vec3d corners[3];
   for (std::size_t i = 0; i < 3; ++i) {
     const std::uint64_t vertex = triangle[i];
@@ -48,19 +51,22 @@ void MeasureStage::add(const Triangle& triangle, const MeshChunk& chunk) {
   sides_.add(triangle);
 }
 
-void MeasureStage::write(const MeshChunk& chunk) {
+template <class Number>
+void MeasureStage<Number>::write(const MeshChunk& chunk) {
   check_cancelled();
-  check_vertex_count(positions_.size() + chunk.positions.size());
+  check_vertex_count<Number>(positions_.size() + chunk.positions.size());
   positions_.append(chunk.positions);
   sets_.grow(positions_.size());
   for (const Vec3f& p : chunk.positions) include(to_double(p));
-  for (const Triangle& triangle : chunk.triangles) add(triangle, chunk);
-  measure_.triangles += chunk.triangles.size();
+  const auto triangles = triangles_of<Number>(chunk, converted_);
+  for (const auto& triangle : triangles) add(triangle, chunk);
+  measure_.triangles += triangles.size();
   next().write(chunk);
 }
 
-void MeasureStage::complete() {
-  sides_.for_each([&](const OpenSides::Side& side) {
+template <class Number>
+void MeasureStage<Number>::complete() {
+  sides_.for_each([&](const typename OpenSides<Number>::Side& side) {
     measure_.open_sides += static_cast<std::uint64_t>(std::abs(side.excess));
   });
   measure_.vertices = sets_.used();
@@ -72,12 +78,16 @@ void MeasureStage::complete() {
                           static_cast<std::int64_t>(sides);
 }
 
-void MeasureStage::finish() {
+template <class Number>
+void MeasureStage<Number>::finish() {
   complete();
   positions_.release();
   sets_.release();
   sides_.release();
   next().finish();
 }
+
+template class MeasureStage<std::uint32_t>;
+template class MeasureStage<std::uint64_t>;
 
 }  // namespace isobrick

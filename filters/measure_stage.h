@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <optional>
+#include <vector>
 
 #include <isobrick/mesh_filters.h>
 #include "filters/filter_stage.h"
@@ -26,11 +27,13 @@ class CompensatedSum {
 };
 
 /// Measures the mesh that it passes on.
+template <class Number>
 class MeasureStage final : public FilterStage {
  public:
   MeasureStage(MeshSink& next, std::stop_token cancel, const ScratchPlace& place,
                std::uint64_t memory);
 
+  bool takes_wide() const override { return next().takes_wide(); }
   void begin(const MeshHeader& header) override;
   void write(const MeshChunk& chunk) override;
   void finish() override;
@@ -43,13 +46,14 @@ class MeasureStage final : public FilterStage {
   std::uint64_t own_memory() const override {
     return positions_.memory() + sets_.memory() + sides_.memory();
   }
-  void add(const Triangle& triangle, const MeshChunk& chunk);
+  void add(const TriangleOf<Number>& triangle, const MeshChunk& chunk);
   void include(Vec3d position);
   void complete();
 
   ScratchArray<Vec3f> positions_;
-  VertexSets sets_;
-  OpenSides sides_;
+  VertexSets<Number> sets_;
+  OpenSides<Number> sides_;
+  std::vector<TriangleOf<Number>> converted_;  ///< of a chunk
   MeshMeasure measure_;
   std::optional<Vec3d> origin_;   ///< of volumes: a vertex, so that coordinates are small
   CompensatedSum area_, volume_;  ///< twice, and six times

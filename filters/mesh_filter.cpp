@@ -100,14 +100,15 @@ void check_filters(const MeshFilterOptions& options) {
 
 std::uint64_t filter_scratch_bytes(const MeshFilterOptions& options, MeshSize mesh,
                                    bool has_normals) {
-  const std::uint64_t v = mesh.vertices, triangles = mesh.triangles * sizeof(Triangle);
+  const std::uint64_t v = mesh.vertices, number = v > kMaxNarrowVertices ? 8 : 4;
+  const std::uint64_t triangles = mesh.triangles * 3 * number;
   const std::uint64_t row = (has_normals ? 2 : 1) * sizeof(Vec3f);
   std::uint64_t bytes = 0;
   // Two filters have the mesh at the same time while one passes it on.
-  if (chooses_components(options)) bytes += v * (row + 16) + triangles;
+  if (chooses_components(options)) bytes += v * (row + 8 + 2 * number) + triangles;
   if (options.smooth > 0) bytes += v * (row + 20) + triangles;
-  if (options.simplifies()) bytes += v * (row + 4 + sizeof(Collapse)) + 2 * triangles;
-  if (options.measure) bytes += v * (sizeof(Vec3f) + 4);
+  if (options.simplifies()) bytes += v * (row + number + sizeof(Collapse)) + 2 * triangles;
+  if (options.measure) bytes += v * (sizeof(Vec3f) + number);
   return bytes;
 }
 
@@ -115,58 +116,72 @@ std::uint64_t filter_scratch_bytes(const MeshFilterOptions& options, MeshSize me
 class MeshFilter::Stages {
  public:
   Stages(MeshSink& sink, const MeshFilterOptions& options)
-      : place_{.beside = options.scratch_beside.string()}, cancel_(options.cancel), first_(&sink) {
+      : sink_(sink), options_(options), place_{.beside = options.scratch_beside.string()} {
     check_filters(options);
-    const bool takes_welded = options.changes_mesh() || options.measure || options.takes_welded;
-    const bool unwelds = takes_welded && sink.indexing() == Indexing::chunk_local;
-    const int shares = int{unwelds} + int{options.measure} + int{options.smooth > 0} +
-                       int{options.simplifies()} + int{chooses_components(options)};
-    memory_ = options.memory / static_cast<std::uint64_t>(std::max(1, shares));
-    // From the sink back to the extraction.
-    if (unwelds) add<UnweldStage>(place_, memory_);
-    count_ = &add<CountStage>(first_->indexing());
-    if (options.measure) measure_ = &add<MeasureStage>(place_, memory_);
-    if (!options.unit.empty()) add<UnitStage>(options.unit);
-    if (options.simplifies())
-      simplify_ =
-          &add<SimplifyStage>(place_, memory_,
-                              Simplification{options.simplify_ratio, options.simplify_triangles,
-                                             options.max_error, options.threads, options.progress});
-    if (options.smooth > 0)
-      add<SmoothStage>(place_, memory_,
-                       Smoothing{options.smooth, options.pass_band, options.progress});
-    if (chooses_components(options))
-      add<ComponentStage>(place_, memory_, ComponentChoice{options.min_component, options.largest});
+    make<std::uint32_t>();
   }
+
+  /// Filters for meshes of more vertices in place of those that were made.
+  void widen() { make<std::uint64_t>(); }
 
   MeshSink& first() { return *first_; }
   MeshSize size() const { return count_->size(); }
   std::optional<MeshMeasure> measure() const {
-    return measure_ ? std::optional(measure_->measure()) : std::nullopt;
+    return measure_ ? std::optional(*measure_) : std::nullopt;
   }
   std::optional<std::uint64_t> simplify_goal() const {
-    return simplify_ ? simplify_->goal() : std::nullopt;
+    return simplify_goal_ ? *simplify_goal_ : std::nullopt;
   }
 
  private:
+  template <class Number>
+  void make() {
+    const MeshFilterOptions& options = options_;
+    stages_.clear();
+    first_ = &sink_;
+    const bool takes_welded = options.changes_mesh() || options.measure || options.takes_welded;
+    const bool unwelds = takes_welded && sink_.indexing() == Indexing::chunk_local;
+    const int shares = int{unwelds} + int{options.measure} + int{options.smooth > 0} +
+                       int{options.simplifies()} + int{chooses_components(options)};
+    const std::uint64_t memory = options.memory / static_cast<std::uint64_t>(std::max(1, shares));
+    // From the sink back to the extraction.
+    if (unwelds) add<UnweldStage<Number>>(place_, memory);
+    count_ = &add<CountStage>(first_->indexing());
+    if (options.measure) measure_ = &add<MeasureStage<Number>>(place_, memory).measure();
+    if (!options.unit.empty()) add<UnitStage>(options.unit);
+    if (options.simplifies())
+      simplify_goal_ = &add<SimplifyStage<Number>>(
+                            place_, memory,
+                            Simplification{options.simplify_ratio, options.simplify_triangles,
+                                           options.max_error, options.threads, options.progress})
+                            .goal();
+    if (options.smooth > 0)
+      add<SmoothStage<Number>>(place_, memory,
+                               Smoothing{options.smooth, options.pass_band, options.progress});
+    if (chooses_components(options))
+      add<ComponentStage<Number>>(place_, memory,
+                                  ComponentChoice{options.min_component, options.largest});
+  }
+
   /// Puts a filter before what is there.
   template <class Stage, class... Arguments>
   Stage& add(Arguments&&... arguments) {
-    auto stage = std::make_unique<Stage>(*first_, cancel_, std::forward<Arguments>(arguments)...);
+    auto stage =
+        std::make_unique<Stage>(*first_, options_.cancel, std::forward<Arguments>(arguments)...);
     Stage& added = *stage;
     first_ = stage.get();
     stages_.push_back(std::move(stage));
     return added;
   }
 
+  MeshSink& sink_;
+  MeshFilterOptions options_;
   ScratchPlace place_;
-  std::stop_token cancel_;
-  std::uint64_t memory_ = 0;  ///< of each filter
   std::vector<std::unique_ptr<FilterStage>> stages_;
   const CountStage* count_ = nullptr;
-  const MeasureStage* measure_ = nullptr;
-  const SimplifyStage* simplify_ = nullptr;
-  MeshSink* first_;
+  const MeshMeasure* measure_ = nullptr;
+  const std::optional<std::uint64_t>* simplify_goal_ = nullptr;
+  MeshSink* first_ = nullptr;
 };
 
 MeshFilter::MeshFilter(MeshSink& sink, const MeshFilterOptions& options)
@@ -179,6 +194,7 @@ bool MeshFilter::takes_wide() const { return stages_->first().takes_wide(); }
 void MeshFilter::begin(const MeshHeader& header) {
   MeshHeader plain = header;
   plain.attributes.clear();
+  if (plain.wide) stages_->widen();
   stages_->first().begin(plain);
 }
 void MeshFilter::write(const MeshChunk& chunk) {
@@ -213,7 +229,7 @@ Mesh apply_filters(const Mesh& mesh, const MeshFilterOptions& options) {
 MeshMeasure measure(const Mesh& mesh) {
   check_numbers(mesh);
   NoSink nowhere;
-  MeasureStage stage(nowhere, {}, {}, kAllMemory);
+  MeasureStage<std::uint32_t> stage(nowhere, {}, {}, kAllMemory);
   stage.begin({.unit = mesh.unit});
   stage.write(mesh.chunk());
   stage.finish();

@@ -1,14 +1,17 @@
 #pragma once
 
 #include <cstdint>
+#include <vector>
 
 #include <isobrick/mesh.h>
 #include "filters/scratch_array.h"
+#include "filters/vertex_numbers.h"
 
 namespace isobrick::inline v0 {
 
 /// Holds a welded mesh in scratch arrays until it is replayed. Vertices keep their numbers, and
 /// triangles their order.
+template <class Number>
 class MeshSpool {
  public:
   /// Its arrays hold at most `memory` bytes together, but one page each.
@@ -24,29 +27,28 @@ class MeshSpool {
   ScratchArray<Vec3f>& positions() { return positions_; }
   /// Empty, or one a position.
   ScratchArray<Vec3f>& normals() { return normals_; }
-  ScratchArray<Triangle>& triangles() { return triangles_; }
+  ScratchArray<TriangleOf<Number>>& triangles() { return triangles_; }
   /// Bytes of the mesh.
   std::uint64_t bytes() const;
   /// Bytes that the arrays hold at most.
   std::uint64_t memory() const;
 
   /// Writes the mesh to a sink of welded chunks, which has begun: all vertices, then all triangles.
-  void replay(MeshSink& to);
+  /// `wide`: as its header said.
+  void replay(MeshSink& to, bool wide);
   /// The same, and frees each array as soon as it is written.
-  void replay_and_release(MeshSink& to);
+  void replay_and_release(MeshSink& to, bool wide);
   /// Frees memory and files.
   void release();
 
  private:
   void write_vertices(MeshSink& to);
-  void write_triangles(MeshSink& to);
+  void write_triangles(MeshSink& to, bool wide);
 
   ScratchArray<Vec3f> positions_, normals_;
-  ScratchArray<Triangle> triangles_;
+  ScratchArray<TriangleOf<Number>> triangles_;
+  std::vector<TriangleOf<Number>> converted_;  ///< of a chunk
   bool has_normals_ = false;
 };
-
-/// Throws Error where a mesh has more vertices than a triangle's numbers can name.
-void check_vertex_count(std::uint64_t vertices);
 
 }  // namespace isobrick

@@ -8,10 +8,9 @@ namespace isobrick::inline v0 {
 namespace {
 
 /// Reads one sorted run through a buffer of its own.
+template <class Side>
 class RunReader {
  public:
-  using Side = OpenSides::Side;
-
   RunReader(ScratchArray<Side>& file, std::uint64_t begin, std::uint64_t end, std::uint64_t buffer)
       : file_(file), next_(begin), end_(end), buffer_sides_(buffer) {
     fill();
@@ -42,7 +41,8 @@ class RunReader {
 }  // namespace
 
 // The table takes half, and the two files, of which one is read and one written, the rest.
-OpenSides::OpenSides(const ScratchPlace& place, std::uint64_t memory)
+template <class Number>
+OpenSides<Number>::OpenSides(const ScratchPlace& place, std::uint64_t memory)
     : max_table_(std::bit_floor(std::max<std::uint64_t>(16, memory / 2 / sizeof(Side)))),
       runs_file_(place, memory / 8),
       merged_file_(place, memory / 8) {
@@ -50,26 +50,28 @@ OpenSides::OpenSides(const ScratchPlace& place, std::uint64_t memory)
   make_table(std::min<std::size_t>(max_table_, 4096));
 }
 
-std::uint64_t OpenSides::memory() const {
+template <class Number>
+std::uint64_t OpenSides<Number>::memory() const {
   // Merging buffers as much of the runs as their file holds, or a side each.
   return max_table_ * sizeof(Side) + 2 * runs_file_.memory() + merged_file_.memory() +
          kFanIn * sizeof(Side);
 }
 
-void OpenSides::make_table(std::size_t size) {
+template <class Number>
+void OpenSides<Number>::make_table(std::size_t size) {
   table_.assign(size, {});
   table_shift_ = 64 - static_cast<unsigned>(std::countr_zero(size));
   waiting_ = 0;
 }
 
-void OpenSides::add_side(std::uint32_t from, std::uint32_t to) {
+template <class Number>
+void OpenSides<Number>::add_side(Number from, Number to) {
   const bool ascends = from < to;
-  const std::uint64_t key =
-      std::uint64_t{ascends ? from : to} << 32 | std::uint64_t{ascends ? to : from};
-  insert(key, ascends ? 1 : -1);
+  insert({ascends ? from : to, ascends ? to : from}, ascends ? 1 : -1);
 }
 
-void OpenSides::insert(std::uint64_t key, std::int64_t excess) {
+template <class Number>
+void OpenSides<Number>::insert(const VertexPair<Number>& key, std::int64_t excess) {
   const std::size_t mask = table_.size() - 1;
   std::size_t i = home_of(key);
   while (table_[i].excess != 0 && table_[i].key != key) i = (i + 1) & mask;
@@ -83,7 +85,8 @@ void OpenSides::insert(std::uint64_t key, std::int64_t excess) {
   if (side.excess == 0) erase(i);
 }
 
-void OpenSides::erase(std::size_t hole) {
+template <class Number>
+void OpenSides<Number>::erase(std::size_t hole) {
   const std::size_t mask = table_.size() - 1;
   // What follows moves up unless that would be before its own place.
   for (std::size_t i = (hole + 1) & mask; table_[i].excess != 0; i = (i + 1) & mask)
@@ -95,7 +98,8 @@ void OpenSides::erase(std::size_t hole) {
   --waiting_;
 }
 
-void OpenSides::grow_or_spill() {
+template <class Number>
+void OpenSides<Number>::grow_or_spill() {
   if (table_.size() >= max_table_) return spill();
   std::vector<Side> old = std::move(table_);
   // Both tables are there for a moment, and the files take nothing yet.
@@ -104,7 +108,8 @@ void OpenSides::grow_or_spill() {
     if (side.excess != 0) insert(side.key, side.excess);
 }
 
-void OpenSides::spill() {
+template <class Number>
+void OpenSides<Number>::spill() {
   if (runs_.size() == kFanIn) {
     const std::uint64_t begin = merged_file_.size();
     merge_runs([&](const Side& side) { merged_file_.push_back(side); });
@@ -123,16 +128,17 @@ void OpenSides::spill() {
   ++spills_;
 }
 
-void OpenSides::merge_runs(const std::function<void(const Side&)>& f) {
-  std::vector<RunReader> readers;
+template <class Number>
+void OpenSides<Number>::merge_runs(const std::function<void(const Side&)>& f) {
+  std::vector<RunReader<Side>> readers;
   for (const Run& run : runs_) readers.emplace_back(runs_file_, run.begin, run.end, buffer_sides());
   const auto first = [&] {
-    RunReader* least = nullptr;
-    for (RunReader& reader : readers)
+    RunReader<Side>* least = nullptr;
+    for (RunReader<Side>& reader : readers)
       if (!reader.ended() && (!least || reader.side().key < least->side().key)) least = &reader;
     return least;
   };
-  for (RunReader* reader = first(); reader;) {
+  for (RunReader<Side>* reader = first(); reader;) {
     Side side = reader->side();
     reader->advance();
     while ((reader = first()) && reader->side().key == side.key) {
@@ -143,17 +149,22 @@ void OpenSides::merge_runs(const std::function<void(const Side&)>& f) {
   }
 }
 
-void OpenSides::for_each(const std::function<void(const Side&)>& f) {
+template <class Number>
+void OpenSides<Number>::for_each(const std::function<void(const Side&)>& f) {
   add_last();
   if (waiting_ > 0) spill();
   merge_runs(f);
 }
 
-void OpenSides::release() {
+template <class Number>
+void OpenSides<Number>::release() {
   table_ = {};
   runs_file_.release();
   merged_file_.release();
   runs_ = {};
 }
+
+template class OpenSides<std::uint32_t>;
+template class OpenSides<std::uint64_t>;
 
 }  // namespace isobrick

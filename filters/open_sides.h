@@ -1,14 +1,45 @@
 #pragma once
 
 #include <array>
+#include <compare>
 #include <cstdint>
 #include <functional>
 #include <vector>
 
 #include <isobrick/mesh.h>
 #include "filters/scratch_array.h"
+#include "filters/vertex_numbers.h"
 
 namespace isobrick::inline v0 {
+
+/// Two vertices in one number, the first in the higher bits, of 32 bits each; of 64 bits a struct.
+template <class Number>
+struct VertexPair;
+
+template <>
+struct VertexPair<std::uint32_t> {
+  std::uint64_t bits = 0;
+
+  constexpr VertexPair() = default;
+  constexpr VertexPair(std::uint32_t first, std::uint32_t second)
+      : bits(std::uint64_t{first} << 32 | second) {}
+  std::uint32_t first() const { return static_cast<std::uint32_t>(bits >> 32); }
+  std::uint32_t second() const { return static_cast<std::uint32_t>(bits); }
+  std::uint64_t hash() const { return bits * 0x9e3779b97f4a7c15u; }
+  friend auto operator<=>(const VertexPair&, const VertexPair&) = default;
+};
+
+template <>
+struct VertexPair<std::uint64_t> {
+  std::uint64_t a = 0, b = 0;
+
+  constexpr VertexPair() = default;
+  constexpr VertexPair(std::uint64_t first, std::uint64_t second) : a(first), b(second) {}
+  std::uint64_t first() const { return a; }
+  std::uint64_t second() const { return b; }
+  std::uint64_t hash() const { return (a * 0xc2b2ae3d27d4eb4fu + b) * 0x9e3779b97f4a7c15u; }
+  friend auto operator<=>(const VertexPair&, const VertexPair&) = default;
+};
 
 /// Finds the sides of triangles that have no reverse, exactly and in bounded memory.
 ///
@@ -17,29 +48,31 @@ namespace isobrick::inline v0 {
 /// it is full they go to a scratch file, sorted by vertices. At the end the sorted runs are merged,
 /// and sides that come from several runs cancel there. Nothing depends on hash values being
 /// different.
+template <class Number>
 class OpenSides {
  public:
   /// An open side between vertices lo < hi: so many more sides from lo to hi than back, or fewer.
   struct Side {
-    std::uint64_t key = 0;  ///< lo << 32 | hi
+    VertexPair<Number> key;
     std::int64_t excess = 0;
 
-    std::uint32_t lo() const { return static_cast<std::uint32_t>(key >> 32); }
-    std::uint32_t hi() const { return static_cast<std::uint32_t>(key); }
+    Number lo() const { return key.first(); }
+    Number hi() const { return key.second(); }
   };
 
   OpenSides(const ScratchPlace& place, std::uint64_t memory);
 
   /// Adds the three sides of a triangle. One between equal vertices is none.
-  void add(const Triangle& t) {
-    std::array<std::uint64_t, 3> sides;
+  void add(const TriangleOf<Number>& t) {
+    std::array<VertexPair<Number>, 3> sides;
     for (std::size_t i = 0; i < 3; ++i) {
-      const std::uint64_t from = t[i], to = t[(i + 1) % 3];
-      sides[i] = from == to ? kNoSide : from << 32 | to;
+      const Number from = t[i], to = t[(i + 1) % 3];
+      sides[i] = from == to ? kNoSide : VertexPair<Number>(from, to);
       added_ += from != to;
       // Triangles of a cell follow each other, so many sides cancel before they need the table.
-      for (std::uint64_t& before : last_)
-        if (before == (to << 32 | from) && sides[i] != kNoSide) before = sides[i] = kNoSide;
+      for (VertexPair<Number>& before : last_)
+        if (before == VertexPair<Number>(to, from) && sides[i] != kNoSide)
+          before = sides[i] = kNoSide;
     }
     add_last();
     last_ = sides;
@@ -64,16 +97,15 @@ class OpenSides {
 
   /// Puts the sides of the last triangle in the table, but for those that have cancelled.
   void add_last() {
-    for (const std::uint64_t side : last_)
-      if (side != kNoSide)
-        add_side(static_cast<std::uint32_t>(side >> 32), static_cast<std::uint32_t>(side));
+    for (const VertexPair<Number>& side : last_)
+      if (side != kNoSide) add_side(side.first(), side.second());
     last_ = {kNoSide, kNoSide, kNoSide};
   }
-  void add_side(std::uint32_t from, std::uint32_t to);
-  std::size_t home_of(std::uint64_t key) const {
-    return static_cast<std::size_t>(key * 0x9e3779b97f4a7c15u >> table_shift_);
+  void add_side(Number from, Number to);
+  std::size_t home_of(const VertexPair<Number>& key) const {
+    return static_cast<std::size_t>(key.hash() >> table_shift_);
   }
-  void insert(std::uint64_t key, std::int64_t excess);
+  void insert(const VertexPair<Number>& key, std::int64_t excess);
   void erase(std::size_t place);
   void make_table(std::size_t size);
   void grow_or_spill();
@@ -81,10 +113,10 @@ class OpenSides {
   void merge_runs(const std::function<void(const Side&)>& f);
   std::uint64_t buffer_sides() const { return runs_file_.memory() / sizeof(Side) / kFanIn + 1; }
 
-  static constexpr std::uint64_t kNoSide = 0;  ///< between a vertex and itself
-  static constexpr std::size_t kFanIn = 16;    ///< runs that are merged at a time
+  static constexpr VertexPair<Number> kNoSide{};  ///< between a vertex and itself
+  static constexpr std::size_t kFanIn = 16;       ///< runs that are merged at a time
 
-  std::array<std::uint64_t, 3> last_{};  ///< sides of the last triangle, from << 32 | to
+  std::array<VertexPair<Number>, 3> last_{};  ///< sides of the last triangle, from and to
   std::size_t max_table_;
   std::vector<Side> table_;  ///< a power of two, at most half of it in use; excess 0 is free
   unsigned table_shift_ = 0;

@@ -41,6 +41,11 @@ std::size_t groups_at_once(int threads, std::uint64_t memory) {
       std::clamp<std::uint64_t>(static_cast<std::uint64_t>(threads), kLeastAtOnce, most));
 }
 
+template <class T>
+std::size_t place_in(const std::vector<T>& items, const T& item) {
+  return static_cast<std::size_t>(&item - items.data());
+}
+
 int threads_of(const Simplification& simplification) {
   const int most = tbb::info::default_concurrency();
   return simplification.threads > 0 ? std::min(simplification.threads, most) : most;
@@ -48,10 +53,14 @@ int threads_of(const Simplification& simplification) {
 
 }  // namespace
 
-SimplifyStage::SimplifyStage(MeshSink& next, std::stop_token cancel, const ScratchPlace& place,
-                             std::uint64_t memory, const Simplification& simplification)
+template <class Number>
+SimplifyStage<Number>::SimplifyStage(MeshSink& next, std::stop_token cancel,
+                                     const ScratchPlace& place, std::uint64_t memory,
+                                     const Simplification& simplification,
+                                     std::uint64_t max_narrow_vertices)
     : FilterStage(next, std::move(cancel)),
       simplification_(simplification),
+      max_narrow_vertices_(max_narrow_vertices),
       arena_(threads_of(simplification)),
       at_once_(groups_at_once(threads_of(simplification), memory)),
       place_(place),
@@ -63,17 +72,21 @@ SimplifyStage::SimplifyStage(MeshSink& next, std::stop_token cancel, const Scrat
   bounds_ = {{far, far, far}, {-far, -far, -far}};
 }
 
-std::uint64_t SimplifyStage::own_memory() const {
+template <class Number>
+std::uint64_t SimplifyStage<Number>::own_memory() const {
   return mesh_.memory() + sorted_memory_ + collapses_.memory() + numbers_.memory() +
          at_once_ * kGroupBytes;
 }
 
-void SimplifyStage::begin(const MeshHeader& header) {
+template <class Number>
+void SimplifyStage<Number>::begin(const MeshHeader& header) {
   mesh_.begin(header);
-  next().begin(header);
+  header_ = header;
+  if constexpr (!kIsWide<Number>) next().begin(header);
 }
 
-void SimplifyStage::write(const MeshChunk& chunk) {
+template <class Number>
+void SimplifyStage<Number>::write(const MeshChunk& chunk) {
   check_cancelled();
   mesh_.append(chunk);
   for (const Vec3f& p : chunk.positions)
@@ -83,15 +96,17 @@ void SimplifyStage::write(const MeshChunk& chunk) {
     }
 }
 
-std::optional<std::uint64_t> SimplifyStage::find_goal() const {
+template <class Number>
+std::optional<std::uint64_t> SimplifyStage<Number>::find_goal() const {
   if (simplification_.triangles > 0) return simplification_.triangles;
   if (simplification_.ratio >= 1 && simplification_.max_error > 0) return std::nullopt;
   return rounded(simplification_.ratio * static_cast<double>(mesh_.size().triangles));
 }
 
 /// Calls f(group) for each group.
+template <class Number>
 template <class F>
-void SimplifyStage::in_parallel(std::vector<TriangleGroup>& groups, F&& f) {
+void SimplifyStage<Number>::in_parallel(std::vector<Group>& groups, F&& f) {
   arena_.execute([&] {
     tbb::parallel_for(std::size_t{0}, groups.size(), [&](std::size_t i) { f(groups[i]); });
   });
@@ -99,36 +114,43 @@ void SimplifyStage::in_parallel(std::vector<TriangleGroup>& groups, F&& f) {
 
 /// Calls f(first, groups) for runs of groups in order, which have no positions yet: the number of
 /// the first one and all of them.
+template <class Number>
 template <class F>
-void SimplifyStage::for_each_run(TriangleGroups& groups, F&& f) {
+void SimplifyStage<Number>::for_each_run(TriangleGroups<Number>& groups, F&& f) {
   for (std::size_t first = 0; first < groups.count(); first += at_once_) {
     check_cancelled();
     const std::size_t count = std::min(at_once_, groups.count() - first);
-    std::vector<TriangleGroup> loaded(count);
-    std::uint64_t bytes = 0;
+    std::vector<std::vector<TriangleOf<Number>>> triangles(count);
+    std::uint64_t loaded_triangles = 0;
     for (std::size_t i = 0; i < count; ++i) {
-      loaded[i].triangles = groups.load(first + i);
-      bytes += groups.size(first + i) * sizeof(Triangle);
+      triangles[i] = groups.load(first + i);
+      loaded_triangles += triangles[i].size();
     }
-    in_parallel(loaded, [](TriangleGroup& group) { number_vertices(group); });
+    std::vector<Group> loaded(count);
+    in_parallel(loaded, [&](Group& group) {
+      group = group_of<Number>(std::exchange(triangles[place_in(loaded, group)], {}));
+    });
     f(first, loaded);
-    progress().advance(bytes);
+    progress().advance(loaded_triangles * sizeof(Triangle));
   }
 }
 
-void SimplifyStage::load_positions(TriangleGroup& group) {
-  for (const std::uint32_t v : group.vertices) group.positions.push_back(mesh_.positions()[v]);
+template <class Number>
+void SimplifyStage<Number>::load_positions(Group& group) {
+  for (const Number v : group.numbers) group.positions.push_back(mesh_.positions()[v]);
 }
 
 /// Finds the collapses of all groups, more than there should be.
-void SimplifyStage::find_collapses(TriangleGroups& groups, double part, double max_distance) {
+template <class Number>
+void SimplifyStage<Number>::find_collapses(TriangleGroups<Number>& groups, double part,
+                                           double max_distance) {
   collapses_.clear();
-  for_each_run(groups, [&](std::size_t, std::vector<TriangleGroup>& loaded) {
-    for (TriangleGroup& group : loaded) load_positions(group);
+  for_each_run(groups, [&](std::size_t, std::vector<Group>& loaded) {
+    for (Group& group : loaded) load_positions(group);
     std::vector<std::vector<Collapse>> found(loaded.size());
-    in_parallel(loaded, [&](const TriangleGroup& group) {
+    in_parallel(loaded, [&](const Group& group) {
       const double least = part / kReserve * static_cast<double>(group.triangles.size());
-      found[static_cast<std::size_t>(&group - loaded.data())] =
+      found[place_in(loaded, group)] =
           EdgeCollapse(group, max_distance).run(static_cast<std::size_t>(least));
     });
     for (const std::vector<Collapse>& collapses : found) collapses_.add(collapses);
@@ -136,10 +158,12 @@ void SimplifyStage::find_collapses(TriangleGroups& groups, double part, double m
 }
 
 /// Does the collapses of the smallest errors.
-void SimplifyStage::collapse(TriangleGroups& groups, std::uint64_t all, std::uint64_t wanted) {
+template <class Number>
+void SimplifyStage<Number>::collapse(TriangleGroups<Number>& groups, std::uint64_t all,
+                                     std::uint64_t wanted) {
   collapses_.select((all - wanted + 1) / 2);  // each takes two triangles away
   double largest = 0;
-  for_each_run(groups, [&](std::size_t first, std::vector<TriangleGroup>& loaded) {
+  for_each_run(groups, [&](std::size_t first, std::vector<Group>& loaded) {
     std::vector<std::vector<Collapse>> collapses(loaded.size());
     for (std::size_t i = 0; i < loaded.size(); ++i) {
       collapses[i] = collapses_.load(first + i);
@@ -147,8 +171,8 @@ void SimplifyStage::collapse(TriangleGroups& groups, std::uint64_t all, std::uin
     }
     std::vector<std::vector<Triangle>> left(loaded.size());
     std::vector<double> errors(loaded.size());
-    in_parallel(loaded, [&](const TriangleGroup& group) {
-      const auto i = static_cast<std::size_t>(&group - loaded.data());
+    in_parallel(loaded, [&](const Group& group) {
+      const auto i = place_in(loaded, group);
       const std::vector<std::uint32_t> last = final_vertices(group, collapses[i]);
       left[i] = collapsed(group, last);
       if (simplification_.measures_error) errors[i] = collapse_error(group, last, left[i]);
@@ -157,13 +181,14 @@ void SimplifyStage::collapse(TriangleGroups& groups, std::uint64_t all, std::uin
       largest = std::max(largest, errors[i]);
       for (const Triangle& t : left[i])
         mesh_.triangles().push_back(
-            {loaded[i].vertices[t[0]], loaded[i].vertices[t[1]], loaded[i].vertices[t[2]]});
+            {loaded[i].numbers[t[0]], loaded[i].numbers[t[1]], loaded[i].numbers[t[2]]});
     }
   });
   error_ += largest;  // passes add up
 }
 
-void SimplifyStage::simplify_all() {
+template <class Number>
+void SimplifyStage<Number>::simplify_all() {
   const std::uint64_t goal = goal_.value_or(0);
   const auto first = static_cast<double>(mesh_.triangles().size());
   const double ratio = static_cast<double>(goal) / first;
@@ -171,7 +196,7 @@ void SimplifyStage::simplify_all() {
   for (std::size_t pass = 0; pass < kSplits.size(); ++pass) {
     const std::uint64_t all = mesh_.triangles().size();
     if (all <= goal) break;
-    TriangleGroups groups(place_, sorted_memory_, kSplits[pass]);
+    TriangleGroups<Number> groups(place_, sorted_memory_, kSplits[pass]);
     groups.sort(mesh_.positions(), bounds_, mesh_.triangles(), kGroupTriangles,
                 [this] { check_cancelled(); });
     // One group has no borders that another pass could simplify.
@@ -189,41 +214,64 @@ void SimplifyStage::simplify_all() {
   }
 }
 
-void SimplifyStage::write_kept() {
-  const std::uint64_t vertices = mesh_.positions().size();
-  numbers_.resize(vertices);
-  mesh_.triangles().for_each_run([&](std::span<const Triangle> run, std::uint64_t) {
+/// With numbers of 64 bits it is not known before how many vertices are left.
+template <class Number>
+void SimplifyStage<Number>::begin_next(std::uint64_t vertices) {
+  if constexpr (!kIsWide<Number>) return;
+  header_.wide = vertices > max_narrow_vertices_;
+  check_takes(next(), header_.wide, vertices);
+  next().begin(header_);
+}
+
+/// Numbers the vertices that triangles name; how many there are.
+template <class Number>
+std::uint64_t SimplifyStage<Number>::number_kept() {
+  numbers_.resize(mesh_.positions().size());
+  mesh_.triangles().for_each_run([&](std::span<const TriangleOf<Number>> run, std::uint64_t) {
     check_cancelled();
-    for (const Triangle& t : run)
-      for (const std::uint32_t v : t) numbers_.edit(v) = 1;
+    for (const auto& t : run)
+      for (const Number v : t) numbers_.edit(v) = 1;
   });
+  Number kept = 0;
+  numbers_.edit_runs([&](std::span<Number> run, std::uint64_t) {
+    check_cancelled();
+    for (Number& number : run)
+      if (number != 0) number = ++kept;
+  });
+  return kept;
+}
+
+template <class Number>
+void SimplifyStage<Number>::write_kept() {
+  const std::uint64_t kept = number_kept();
+  begin_next(kept);
   std::vector<Vec3f> positions, normals;
-  std::uint32_t kept = 0;
+  std::uint64_t before = 0;
   mesh_.positions().for_each_run([&](std::span<const Vec3f> run, std::uint64_t first) {
     check_cancelled();
     positions.clear();
     normals.clear();
-    const std::uint32_t before = kept;
     for (std::size_t i = 0; i < run.size(); ++i) {
       if (numbers_[first + i] == 0) continue;
-      numbers_.edit(first + i) = ++kept;
       positions.push_back(run[i]);
       if (mesh_.has_normals()) normals.push_back(mesh_.normals()[first + i]);
     }
     if (!positions.empty())
       next().write({.first_vertex = before, .positions = positions, .normals = normals});
+    before += positions.size();
   });
-  std::vector<Triangle> triangles;
-  mesh_.triangles().for_each_run([&](std::span<const Triangle> run, std::uint64_t) {
+  std::vector<TriangleOf<Number>> triangles;
+  mesh_.triangles().for_each_run([&](std::span<const TriangleOf<Number>> run, std::uint64_t) {
     check_cancelled();
     triangles.clear();
-    for (const Triangle& t : run)
+    for (const auto& t : run)
       triangles.push_back({numbers_[t[0]] - 1, numbers_[t[1]] - 1, numbers_[t[2]] - 1});
-    next().write({.first_vertex = kept, .triangles = triangles});
+    write_triangles<Number>(next(), header_.wide, kept, triangles);
   });
 }
 
-void SimplifyStage::finish() {
+template <class Number>
+void SimplifyStage<Number>::finish() {
   goal_ = find_goal();
   if (goal_.value_or(0) < mesh_.size().triangles) {
     simplify_all();
@@ -232,9 +280,13 @@ void SimplifyStage::finish() {
     numbers_.release();
     collapses_.release();
   } else {
-    mesh_.replay_and_release(next());
+    begin_next(mesh_.size().vertices);
+    mesh_.replay_and_release(next(), header_.wide);
   }
   next().finish();
 }
+
+template class SimplifyStage<std::uint32_t>;
+template class SimplifyStage<std::uint64_t>;
 
 }  // namespace isobrick

@@ -31,23 +31,29 @@ struct Simplification {
 /// Vertices on the borders of groups stay, so neighbours fit together. Two more passes, with other
 /// boxes, simplify what the first ones left along the borders. Kept vertices keep their place,
 /// normal and order.
+template <class Number>
 class SimplifyStage final : public FilterStage {
  public:
   SimplifyStage(MeshSink& next, std::stop_token cancel, const ScratchPlace& place,
-                std::uint64_t memory, const Simplification& simplification);
+                std::uint64_t memory, const Simplification& simplification,
+                std::uint64_t max_narrow_vertices = kMaxNarrowVertices);
 
+  /// What is left may be small enough for any sink.
+  bool takes_wide() const override { return true; }
   void begin(const MeshHeader& header) override;
   void write(const MeshChunk& chunk) override;
   void finish() override;
 
   /// Triangles that it aimed at, after finish(); nothing where only the error decides.
-  std::optional<std::uint64_t> goal() const { return goal_; }
+  const std::optional<std::uint64_t>& goal() const { return goal_; }
   /// How far the mesh that entered is at most from the mesh that left, after finish(), in world
   /// units: the sum over passes of what their vertices and the centres of their triangles are.
   /// Simplification::measures_error requests it.
   double error() const { return error_; }
 
  private:
+  using Group = GroupOfMesh<Number>;
+
   std::uint64_t own_bytes() const override {
     return mesh_.bytes() + sorted_bytes_ + numbers_.file_bytes();
   }
@@ -57,24 +63,28 @@ class SimplifyStage final : public FilterStage {
   }
   std::optional<std::uint64_t> find_goal() const;
   void simplify_all();
-  void find_collapses(TriangleGroups& groups, double part, double max_distance);
-  void collapse(TriangleGroups& groups, std::uint64_t all, std::uint64_t wanted);
-  void load_positions(TriangleGroup& group);
+  void find_collapses(TriangleGroups<Number>& groups, double part, double max_distance);
+  void collapse(TriangleGroups<Number>& groups, std::uint64_t all, std::uint64_t wanted);
+  void load_positions(Group& group);
   template <class F>
-  void in_parallel(std::vector<TriangleGroup>& groups, F&& f);
+  void in_parallel(std::vector<Group>& groups, F&& f);
   template <class F>
-  void for_each_run(TriangleGroups& groups, F&& f);
+  void for_each_run(TriangleGroups<Number>& groups, F&& f);
+  void begin_next(std::uint64_t vertices);
+  std::uint64_t number_kept();
   void write_kept();
 
   Simplification simplification_;
+  std::uint64_t max_narrow_vertices_;
+  MeshHeader header_;  ///< of the mesh that leaves
   tbb::task_arena arena_;
   std::size_t at_once_;  ///< groups
   ScratchPlace place_;
   std::uint64_t sorted_memory_;
   std::uint64_t sorted_bytes_ = 0;
-  MeshSpool mesh_;
+  MeshSpool<Number> mesh_;
   CollapseSpool collapses_;
-  ScratchArray<std::uint32_t> numbers_;  ///< of kept vertices plus 1; 0: not kept
+  ScratchArray<Number> numbers_;  ///< of kept vertices plus 1; 0: not kept
   MeshBounds bounds_;
   std::optional<std::uint64_t> goal_;
   double error_ = 0;

@@ -4,12 +4,12 @@
 #include <vector>
 
 #include "core/vectors.h"
-#include "filters/mesh_spool.h"
 
 namespace isobrick::inline v0 {
 
-SmoothStage::SmoothStage(MeshSink& next, std::stop_token cancel, const ScratchPlace& place,
-                         std::uint64_t memory, const Smoothing& smoothing)
+template <class Number>
+SmoothStage<Number>::SmoothStage(MeshSink& next, std::stop_token cancel, const ScratchPlace& place,
+                                 std::uint64_t memory, const Smoothing& smoothing)
     : FilterStage(next, std::move(cancel)),
       smoothing_(smoothing),
       vertices_(place, memory / 2),
@@ -17,37 +17,43 @@ SmoothStage::SmoothStage(MeshSink& next, std::stop_token cancel, const ScratchPl
       triangles_(place, memory / 4),
       sides_(place, memory / 16 * 3) {}
 
-void SmoothStage::begin(const MeshHeader& header) {
+template <class Number>
+void SmoothStage<Number>::begin(const MeshHeader& header) {
   has_normals_ = header.has_normals;
+  wide_ = header.wide;
   next().begin(header);
 }
 
-void SmoothStage::write(const MeshChunk& chunk) {
+template <class Number>
+void SmoothStage<Number>::write(const MeshChunk& chunk) {
   check_cancelled();
-  check_vertex_count(vertices_.size() + chunk.positions.size());
+  check_vertex_count<Number>(vertices_.size() + chunk.positions.size());
   for (const Vec3f& position : chunk.positions) vertices_.push_back({.position = position});
   normals_.append(chunk.normals);
-  triangles_.append(chunk.triangles);
-  for (const Triangle& triangle : chunk.triangles) sides_.add(triangle);
+  const auto triangles = triangles_of<Number>(chunk, converted_);
+  triangles_.append(triangles);
+  for (const auto& triangle : triangles) sides_.add(triangle);
 }
 
-void SmoothStage::fix_borders() {
-  sides_.for_each([&](const OpenSides::Side& side) {
+template <class Number>
+void SmoothStage<Number>::fix_borders() {
+  sides_.for_each([&](const typename OpenSides<Number>::Side& side) {
     vertices_.edit(side.lo()).is_fixed = 1;
     vertices_.edit(side.hi()).is_fixed = 1;
   });
   sides_.release();
 }
 
-void SmoothStage::add_differences() {
-  const auto add = [&](std::uint32_t vertex, Vec3f difference) {
+template <class Number>
+void SmoothStage<Number>::add_differences() {
+  const auto add = [&](Number vertex, Vec3f difference) {
     Vertex& v = vertices_.edit(vertex);
     v.sum = v.sum + difference;
     v.differences += 2;
   };
-  triangles_.for_each_run([&](std::span<const Triangle> run, std::uint64_t) {
+  triangles_.for_each_run([&](std::span<const TriangleOf<Number>> run, std::uint64_t) {
     check_cancelled();
-    for (const Triangle& t : run) {
+    for (const auto& t : run) {
       const Vec3f a = vertices_[t[0]].position, b = vertices_[t[1]].position,
                   c = vertices_[t[2]].position;
       const Vec3f ab = b - a, bc = c - b, ca = a - c;
@@ -59,7 +65,8 @@ void SmoothStage::add_differences() {
   });
 }
 
-void SmoothStage::move(double fraction) {
+template <class Number>
+void SmoothStage<Number>::move(double fraction) {
   vertices_.edit_runs([&](std::span<Vertex> run, std::uint64_t) {
     check_cancelled();
     for (Vertex& v : run) {
@@ -72,14 +79,15 @@ void SmoothStage::move(double fraction) {
   });
 }
 
-void SmoothStage::add_normals() {
-  triangles_.for_each_run([&](std::span<const Triangle> run, std::uint64_t) {
+template <class Number>
+void SmoothStage<Number>::add_normals() {
+  triangles_.for_each_run([&](std::span<const TriangleOf<Number>> run, std::uint64_t) {
     check_cancelled();
-    for (const Triangle& t : run) {
+    for (const auto& t : run) {
       const Vec3d a = to_double(vertices_[t[0]].position), b = to_double(vertices_[t[1]].position),
                   c = to_double(vertices_[t[2]].position);
       const Vec3f product = to_float(cross(b - a, c - a));
-      for (const std::uint32_t corner : t) {
+      for (const Number corner : t) {
         Vec3f& sum = vertices_.edit(corner).sum;
         sum = sum + product;
       }
@@ -87,7 +95,8 @@ void SmoothStage::add_normals() {
   });
 }
 
-void SmoothStage::write_vertices() {
+template <class Number>
+void SmoothStage<Number>::write_vertices() {
   std::vector<Vec3f> positions, normals;
   vertices_.for_each_run([&](std::span<const Vertex> run, std::uint64_t first) {
     check_cancelled();
@@ -102,11 +111,12 @@ void SmoothStage::write_vertices() {
   });
 }
 
-void SmoothStage::finish() {
+template <class Number>
+void SmoothStage<Number>::finish() {
   fix_borders();
   const double mu = 1 / (smoothing_.pass_band - 1 / kLambda);
   progress().begin("smoothing", 2 * static_cast<std::uint64_t>(smoothing_.iterations) *
-                                    triangles_.size() * sizeof(Triangle));
+                                    triangles_.size() * sizeof(TriangleOf<Number>));
   for (int i = 0; i < smoothing_.iterations; ++i) {
     for (const double fraction : {kLambda, mu}) {
       add_differences();
@@ -119,11 +129,14 @@ void SmoothStage::finish() {
   write_vertices();
   vertices_.release();
   normals_.release();
-  triangles_.for_each_run([&](std::span<const Triangle> run, std::uint64_t) {
-    next().write({.first_vertex = vertices, .triangles = run});
+  triangles_.for_each_run([&](std::span<const TriangleOf<Number>> run, std::uint64_t) {
+    write_triangles<Number>(next(), wide_, vertices, run);
   });
   triangles_.release();
   next().finish();
 }
+
+template class SmoothStage<std::uint32_t>;
+template class SmoothStage<std::uint64_t>;
 
 }  // namespace isobrick

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <vector>
 
 #include <isobrick/progress.h>
 #include "filters/filter_stage.h"
@@ -25,11 +26,13 @@ struct Smoothing {
 /// A step is a pass over the triangles, which adds to each corner its differences to the other two.
 /// Two triangles share each side, so every neighbour counts twice. Sums are in the order of the
 /// triangles, whatever the chunks.
+template <class Number>
 class SmoothStage final : public FilterStage {
  public:
   SmoothStage(MeshSink& next, std::stop_token cancel, const ScratchPlace& place,
               std::uint64_t memory, const Smoothing& smoothing);
 
+  bool takes_wide() const override { return next().takes_wide(); }
   void begin(const MeshHeader& header) override;
   void write(const MeshChunk& chunk) override;
   void finish() override;
@@ -59,11 +62,12 @@ class SmoothStage final : public FilterStage {
   void write_vertices();
 
   Smoothing smoothing_;
-  bool has_normals_ = false;
+  bool has_normals_ = false, wide_ = false;  ///< of the header
   ScratchArray<Vertex> vertices_;
   ScratchArray<Vec3f> normals_;
-  ScratchArray<Triangle> triangles_;
-  OpenSides sides_;
+  ScratchArray<TriangleOf<Number>> triangles_;
+  OpenSides<Number> sides_;
+  std::vector<TriangleOf<Number>> converted_;  ///< of a chunk
 };
 
 }  // namespace isobrick

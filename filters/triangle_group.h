@@ -1,21 +1,29 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
 #include <isobrick/mesh.h>
+#include "filters/vertex_numbers.h"
 
 namespace isobrick::inline v0 {
 
 /// Triangles near each other, with the vertices that they name.
 struct TriangleGroup {
-  std::vector<std::uint32_t> vertices;  ///< their numbers in the mesh, ascending
-  std::vector<Vec3f> positions;         ///< of those, where they are needed
-  std::vector<Triangle> triangles;      ///< that name `vertices` by their places
+  std::size_t vertices = 0;         ///< how many there are
+  std::vector<Vec3f> positions;     ///< of those, where they are needed
+  std::vector<Triangle> triangles;  ///< that name vertices by their places in the group
 };
 
-/// Lists the vertices that the triangles name by their numbers in the mesh, and names them by their
-/// places.
-void number_vertices(TriangleGroup& group);
+/// The same of a larger mesh.
+template <class Number>
+struct GroupOfMesh : TriangleGroup {
+  std::vector<Number> numbers;  ///< of its vertices in the mesh, ascending
+};
+
+/// The group of triangles that name vertices by their numbers in the mesh. Without positions.
+template <class Number>
+GroupOfMesh<Number> group_of(const std::vector<TriangleOf<Number>>& triangles);
 
 }  // namespace isobrick

@@ -6,23 +6,25 @@
 
 #include <isobrick/mesh.h>
 #include "filters/scratch_array.h"
+#include "filters/vertex_numbers.h"
 
 namespace isobrick::inline v0 {
 
 /// Which vertices triangles connect: a union-find whose root is the smallest vertex of its set, so
 /// that nothing depends on the order of the unions. Vertices that no triangle names are in no set.
+template <class Number>
 class VertexSets {
  public:
-  static constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
+  static constexpr Number kNone = std::numeric_limits<Number>::max();
 
   VertexSets(const ScratchPlace& place, std::uint64_t memory) : next_(place, memory) {}
 
   /// More vertices, up to so many.
   void grow(std::uint64_t vertices) { next_.resize(vertices); }
   /// Connects the corners of a triangle.
-  void connect(const Triangle& t) {
+  void connect(const TriangleOf<Number>& t) {
     // One after the other: a union may take a root from what was found before it.
-    std::uint32_t root = find(t[0]);
+    Number root = find(t[0]);
     root = join(root, find(t[1]));
     join(root, find(t[2]));
   }
@@ -33,17 +35,17 @@ class VertexSets {
   /// Afterwards root() is valid, and nothing is connected any more.
   void flatten() {
     for (std::uint64_t v = 0; v < next_.size(); ++v) {
-      const std::uint32_t down = next_[v];
+      const Number down = next_[v];
       if (down == 0) continue;
       // Vertices before are flat already.
-      const std::uint32_t of_parent = next_[v - (down - 1)];
+      const Number of_parent = next_[v - (down - 1)];
       if (of_parent > 1) next_.edit(v) = down + (of_parent - 1);
     }
   }
   /// The smallest vertex of the set, or kNone.
-  std::uint32_t root(std::uint64_t vertex) {
-    const std::uint32_t down = next_[vertex];
-    return down == 0 ? kNone : static_cast<std::uint32_t>(vertex - (down - 1));
+  Number root(std::uint64_t vertex) {
+    const Number down = next_[vertex];
+    return down == 0 ? kNone : static_cast<Number>(vertex - (down - 1));
   }
 
   std::uint64_t size() const { return next_.size(); }
@@ -51,15 +53,15 @@ class VertexSets {
   std::uint64_t memory() const { return next_.memory(); }
 
  private:
-  std::uint32_t find(std::uint32_t v) {
-    std::uint32_t down = next_[v];
+  Number find(Number v) {
+    Number down = next_[v];
     if (down == 0) {
       next_.edit(v) = 1;
       ++used_;
       return v;
     }
     while (down != 1) {
-      const std::uint32_t up = v - (down - 1), further = next_[up] - 1;
+      const Number up = v - (down - 1), further = next_[up] - 1;
       if (further != 0) next_.edit(v) = down + further;  // halves the path
       v = up - further;
       down = next_[v];
@@ -67,7 +69,7 @@ class VertexSets {
     return v;
   }
   /// The root of both.
-  std::uint32_t join(std::uint32_t a, std::uint32_t b) {
+  Number join(Number a, Number b) {
     if (a == b) return a;
     if (b < a) std::swap(a, b);
     next_.edit(b) = b - a + 1;
@@ -77,7 +79,7 @@ class VertexSets {
 
   /// By vertex, 1 more than the distance to a smaller one of the set; 1 of a root, and 0 where no
   /// triangle was. So new elements need no other value than the array gives them.
-  ScratchArray<std::uint32_t> next_;
+  ScratchArray<Number> next_;
   std::uint64_t used_ = 0, joins_ = 0;
 };
 

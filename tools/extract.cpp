@@ -322,7 +322,7 @@ void add_outputs(CLI::App* app, ExtractArguments& arguments) {
   add_flag(app, "--quantize", arguments.quantize,
            "GLB with positions and normals of 16 bits (KHR_mesh_quantization)");
   add_flag(app, "--compress", arguments.compress,
-           "GLB compressed without loss (EXT_meshopt_compression)");
+           "GLB and 3D Tiles compressed without loss (EXT_meshopt_compression)");
   add_parsed(app, arguments.levels, parse_detail_levels,
              {"--levels", "auto|N",
               "Levels of detail of neuroglancer's format and 3D Tiles at most, each with a quarter "

@@ -9,6 +9,7 @@
 #include "core/stopwatch.h"
 #include "io/bytes/output_guard.h"
 #include "pipeline/pieces/piece_maker.h"
+#include "ranks/piece_sums.h"
 #include "ranks/share_plans.h"
 #include "ranks/write_ply.h"
 #include "ranks/write_pvtp.h"
@@ -42,89 +43,14 @@ std::uint32_t count_parts(const StoreReader& store, ExtractOptions options, cons
                       options.backend == Backend::cuda);
 }
 
-/// What pieces took, as numbers that ranks can add up.
-struct PieceSums {
-  std::uint64_t kept = 0, vertices = 0, triangles = 0, degenerate = 0;
-  std::uint64_t bricks_read = 0, brick_reads = 0, bytes_read = 0, search_bytes = 0, launches = 0;
-  double seconds = 0, plan_seconds = 0, decode_seconds = 0, surface_seconds = 0, search_seconds = 0;
-  StageReport read = {}, decode = {}, surface = {}, sink = {};
-  StageReport upload = {}, gather = {}, kernel = {}, download = {};
-};
-
-void add(const StageReport& from, StageReport& to) {
-  to.seconds += from.seconds;
-  to.bytes += from.bytes;
-}
-
-void add(const PieceSums& from, PieceSums& to) {
-  to.kept += from.kept;
-  to.vertices += from.vertices;
-  to.triangles += from.triangles;
-  to.degenerate += from.degenerate;
-  to.bricks_read += from.bricks_read;
-  to.brick_reads += from.brick_reads;
-  to.bytes_read += from.bytes_read;
-  to.search_bytes += from.search_bytes;
-  to.launches += from.launches;
-  to.seconds += from.seconds;
-  to.plan_seconds += from.plan_seconds;
-  to.decode_seconds += from.decode_seconds;
-  to.surface_seconds += from.surface_seconds;
-  to.search_seconds += from.search_seconds;
-  add(from.read, to.read);
-  add(from.decode, to.decode);
-  add(from.surface, to.surface);
-  add(from.sink, to.sink);
-  add(from.upload, to.upload);
-  add(from.gather, to.gather);
-  add(from.kernel, to.kernel);
-  add(from.download, to.download);
-}
-
-PieceSums sums_of(const PieceReport& piece) {
-  const ExtractReport& r = piece.surface;
-  return {.kept = piece.is_kept,
-          .vertices = r.vertices,
-          .triangles = r.triangles,
-          .degenerate = r.degenerate_triangles,
-          .bricks_read = r.bricks_read,
-          .brick_reads = r.brick_reads,
-          .bytes_read = r.bytes_read,
-          .search_bytes = r.search_bytes,
-          .launches = r.launches,
-          .seconds = r.seconds,
-          .plan_seconds = r.plan_seconds,
-          .decode_seconds = r.decode_seconds,
-          .surface_seconds = r.surface_seconds,
-          .search_seconds = r.search_seconds,
-          .read = r.read,
-          .decode = r.decode,
-          .surface = r.surface,
-          .sink = r.sink,
-          .upload = r.upload,
-          .gather = r.gather,
-          .kernel = r.kernel,
-          .download = r.download};
-}
-
-void put_sums(const PieceSums& sums, ExtractReport& r) {
-  r.bricks_read = sums.bricks_read;
-  r.brick_reads = sums.brick_reads;
-  r.bytes_read = sums.bytes_read;
-  r.search_bytes = sums.search_bytes;
-  r.launches = sums.launches;
-  r.plan_seconds = sums.plan_seconds;
-  r.decode_seconds = sums.decode_seconds;
-  r.surface_seconds = sums.surface_seconds;
-  r.search_seconds = sums.search_seconds;
-  r.read = sums.read;
-  r.decode = sums.decode;
-  r.surface = sums.surface;
-  r.sink = sums.sink;
-  r.upload = sums.upload;
-  r.gather = sums.gather;
-  r.kernel = sums.kernel;
-  r.download = sums.download;
+SummedMembers<ExtractReport> summed_members() {
+  using Report = ExtractReport;
+  return {{&Report::degenerate_triangles, &Report::bricks_read, &Report::brick_reads,
+           &Report::bytes_read, &Report::search_bytes, &Report::launches},
+          {&Report::plan_seconds, &Report::decode_seconds, &Report::surface_seconds,
+           &Report::search_seconds},
+          {&Report::read, &Report::decode, &Report::surface, &Report::sink, &Report::upload,
+           &Report::gather, &Report::kernel, &Report::download}};
 }
 
 /// Whether the ranks can write their pieces of the mesh as they are.
@@ -192,13 +118,10 @@ class PieceWork {
       for (std::uint32_t number = 1; number <= made_.total; ++number) make(number);
     } else {
       deal(*job_, made_.total, [&](std::uint64_t i) { make(static_cast<std::uint32_t>(i + 1)); });
-      const auto all = job_->gather(std::as_bytes(std::span(&sums_, 1)));
-      sums_ = {};
-      for (const Ranks::Bytes& of_rank : all) add(to_items<PieceSums>(of_rank).front(), sums_);
+      sums_.gather(*job_);
     }
-    made_.kept = sums_.kept;
-    put_sums(sums_, made_.report);
-    made_.report.degenerate_triangles = sums_.degenerate;
+    made_.kept = sums_.kept();
+    sums_.put(made_.report);
   }
 
   void take(const PieceReport& piece) {
@@ -212,14 +135,14 @@ class PieceWork {
         std::max(made_.report.device_bytes_in_use, piece.surface.device_bytes_in_use);
     made_.report.pinned_bytes = std::max(made_.report.pinned_bytes, piece.surface.pinned_bytes);
     made_.report.pool_bricks = std::max(made_.report.pool_bricks, piece.surface.pool_bricks);
-    add(sums_of(piece), sums_);
+    sums_.add(piece.surface, piece.is_kept);
   }
 
   const ExtractedSurface& surface_;
   const PieceMaker& maker_;
   Ranks* job_;
   Console& console_;
-  PieceSums sums_;
+  PieceSums<ExtractReport> sums_{summed_members()};
   MadePieces made_;
 };
 

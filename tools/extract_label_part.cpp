@@ -100,16 +100,10 @@ LabelsByPieces make_labels_by_pieces(const LabelOutput& output, const LabelListi
     make_pieces();
   } else {
     const Stopwatch watch(seconds);
-    made.written = write_labels(output, listing,
-                                [&](int visits, const fs::path& beside, const LabelVisitor& visit) {
-                                  make_pieces();
-                                  return merge_label_pieces(pieces.paths,
-                                                            {.memory = options.memory,
-                                                             .threads = options.threads,
-                                                             .visits = visits,
-                                                             .scratch_beside = beside},
-                                                            visit, console.progress());
-                                });
+    made.written = write_labels(output, listing, [&](const LabelTarget& target) {
+      make_pieces();
+      return merge_labels(output, pieces.paths, target, console.progress());
+    });
     remove_piece_folder(folder);
   }
   if (job != nullptr) job->wait_for_all();

@@ -46,7 +46,8 @@ LabelOutput output_of(const ExtractArguments& arguments) {
                      .filters = arguments.filters,
                      .memory = arguments.memory,
                      .threads = arguments.threads,
-                     .force = arguments.force};
+                     .force = arguments.force,
+                     .no_space_check = arguments.no_space_check};
   check_label_output(output);
   if (output.folder.empty())
     output.folder = stem_of_input(arguments.input.path, arguments.input.volume) + "_labels";
@@ -153,12 +154,12 @@ int run_extract_labels(const ExtractArguments& given, Console& console) {
   if (is_by_pieces)
     made = make_labels_by_pieces(output, listing, store, options, job, console);
   else
-    made.written = write_labels(output, listing,
-                                [&](int visits, const fs::path& folder, const LabelVisitor& visit) {
-                                  options.visits = visits;
-                                  options.scratch_beside = folder;
-                                  return extract_labels(store, options, visit, console.progress());
-                                });
+    made.written = write_labels(output, listing, [&](const LabelTarget& target) {
+      options.visits = target.visits;
+      options.scratch_beside = target.scratch_beside;
+      options.check_totals = target.check_totals;
+      return extract_labels(store, options, target.visit, console.progress());
+    });
   if (made.written.report.labels == 0)
     console.note("there is no label but the background 0, so the folder has no mesh");
   ordered_json result = report_json(arguments, output, made.written);

@@ -12,6 +12,7 @@
 #include <nlohmann/json.hpp>
 
 #include <isobrick/error.h>
+#include <isobrick/label_pieces.h>
 #include "io/bytes/folder_output.h"
 #include "io/bytes/folder_walk.h"
 #include "io/bytes/output_file.h"
@@ -22,6 +23,7 @@
 #include "tools/format.h"
 #include "tools/label_report.h"
 #include "tools/measure_report.h"
+#include "tools/mesh_space.h"
 #include "tools/output_name.h"
 
 namespace isobrick::tools {
@@ -77,6 +79,33 @@ VisitPlan plan_visits(const LabelOutput& output, const MeshFilterOptions& filter
   return plan;
 }
 
+MeshFilterOptions filter_of_meshes(const LabelOutput& output) {
+  MeshFilterOptions filter = filter_options(output.filters);
+  filter.smooth = 0;  // all meshes are smoothed together, before
+  return filter;
+}
+
+/// Refuses meshes that do not fit the disk beside other files of `others` bytes.
+void check_space(const LabelOutput& output, const LabelTotals& totals, int visits,
+                 std::uint64_t others) {
+  if (output.no_space_check) return;
+  const fs::path folder = without_slash(output.folder);
+  const MeshForm form{.format = output.mesh_format(),
+                      .normals = output.normals && has_levels(output.mesh_format()),
+                      .quantize = output.quantize,
+                      .compress = output.compress,
+                      .sharded = output.sharded};
+  const std::uint64_t needed =
+      others + predict_label_bytes(form, filter_of_meshes(output), totals, visits);
+  const std::uint64_t free = free_space(folder);
+  if (needed > free)
+    throw Error(fmt::format(
+        "'{}' will have {} triangles and need {}, but its disk has {} free; choose another disk "
+        "(or --no-space-check)",
+        folder.string(), human_count(totals.size.triangles), human_bytes(needed),
+        human_bytes(free)));
+}
+
 /// Writes the meshes of labels, and what the list has of them.
 class LabelWriter {
  public:
@@ -89,18 +118,22 @@ class LabelWriter {
     list_.writer().append(
         fmt::format("{{\"schema\": {}, \"input\": {}, \"level\": {}, \"labels\": [", kJsonSchema,
                     ordered_json(listing.name).dump(), listing.level));
-    filter_ = filter_options(output.filters);
-    filter_.smooth = 0;  // all meshes are smoothed together, before
+    filter_ = filter_of_meshes(output);
     plan_ = plan_visits(output, filter_);
     filter_.memory = plan_.filter_bytes;
     filter_.threads = 1;
     if (has_levels(format_))
       levels_ = open_level_folder(folder_, {.as_tiles = format_ == MeshFormat::tiles3d,
+                                            .compress = output.compress,
                                             .sharded = output.sharded,
                                             .has_labels = true});
   }
 
   int visits() const { return plan_.visits; }
+
+  void check_totals(const LabelTotals& totals) const {
+    check_space(output_, totals, plan_.visits, 0);
+  }
 
   void write(const LabelMesh& mesh) {
     const std::string name = file_of(mesh.label());
@@ -221,10 +254,12 @@ void check_label_output(const LabelOutput& output) {
     throw UsageError("PVTP has several files for a mesh; choose another --format for labels");
   if (output.quantize && output.format != MeshFormat::glb)
     throw UsageError("--quantize is for GLB only: add --format glb");
-  if (output.compress && output.format != MeshFormat::glb)
-    throw UsageError("--compress is for GLB only: add --format glb");
-  check_levels(
-      {.format = output.mesh_format(), .levels = output.levels, .sharded = output.sharded});
+  const MeshForm form{.format = output.mesh_format(),
+                      .compress = output.compress,
+                      .levels = output.levels,
+                      .sharded = output.sharded};
+  check_compression(form);
+  check_levels(form);
 }
 
 void check_label_folder(const LabelOutput& output) {
@@ -240,10 +275,27 @@ WrittenLabels write_labels(const LabelOutput& output, const LabelListing& listin
   FolderOutput folder(output.folder, output.force, is_own_name);
   LabelWriter writer(output, listing, folder.folder());
   const LabelReport report =
-      make(writer.visits(), folder.path(), [&](const LabelMesh& mesh) { writer.write(mesh); });
+      make({.visits = writer.visits(),
+            .scratch_beside = folder.path(),
+            .check_totals = [&](const LabelTotals& totals) { writer.check_totals(totals); },
+            .visit = [&](const LabelMesh& mesh) { writer.write(mesh); }});
   writer.finish();
   folder.publish();
   return {report, writer.written(), writer.bytes()};
+}
+
+LabelReport merge_labels(const LabelOutput& output, std::span<const fs::path> pieces,
+                         const LabelTarget& target, Progress& progress) {
+  // The scratch file is as large as the pieces; how large single meshes are is not known yet.
+  const LabelPiecesInfo info = read_label_pieces(pieces);
+  check_space(output, {.labels = 1, .size = info.size}, 0, info.bytes);
+  return merge_label_pieces(pieces,
+                            {.memory = output.memory,
+                             .threads = output.threads,
+                             .visits = target.visits,
+                             .scratch_beside = target.scratch_beside,
+                             .check_totals = target.check_totals},
+                            target.visit, progress);
 }
 
 std::string sizes_text(const WrittenLabels& written) {

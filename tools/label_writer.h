@@ -4,9 +4,11 @@
 #include <filesystem>
 #include <functional>
 #include <optional>
+#include <span>
 #include <string>
 
 #include <isobrick/labels.h>
+#include <isobrick/progress.h>
 #include "tools/filter_options.h"
 #include "tools/mesh_output.h"
 
@@ -25,7 +27,7 @@ struct LabelOutput {
   FilterArguments filters;  ///< of each mesh, without smoothing, which is that of all of them
   std::uint64_t memory = 0;
   int threads = 0;
-  bool force = false;
+  bool force = false, no_space_check = false;
 
   MeshFormat mesh_format() const;
 };
@@ -49,15 +51,27 @@ struct WrittenLabels {
   std::uint64_t bytes = 0;  ///< of the folder
 };
 
-/// Makes the meshes and passes them to `visit`, so many at a time; its scratch files lie beside the
-/// folder.
-using MakeLabels = std::function<LabelReport(int visits, const std::filesystem::path& folder,
-                                             const LabelVisitor& visit)>;
+/// Where meshes of labels go.
+struct LabelTarget {
+  int visits = 1;                        ///< meshes at a time
+  std::filesystem::path scratch_beside;  ///< the folder
+  std::function<void(const LabelTotals&)> check_totals;
+  LabelVisitor visit;
+};
+
+/// Makes the meshes and passes them on.
+using MakeLabels = std::function<LabelReport(const LabelTarget& target)>;
 
 /// Writes the folder, which has its name when all of it is there. Throws as FolderOutput does,
-/// before anything is made, and UsageError for a budget too small.
+/// before anything is made, UsageError for a budget too small, and Error before the first mesh
+/// where all of them do not fit the disk.
 WrittenLabels write_labels(const LabelOutput& output, const LabelListing& listing,
                            const MakeLabels& make);
+
+/// Makes meshes from pieces, for write_labels(). Throws Error where the disk has no room for the
+/// meshes and their scratch file, before anything is read.
+LabelReport merge_labels(const LabelOutput& output, std::span<const std::filesystem::path> pieces,
+                         const LabelTarget& target, Progress& progress);
 
 /// "12 labels: 3.1 M triangles".
 std::string sizes_text(const WrittenLabels& written);

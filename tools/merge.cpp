@@ -176,22 +176,17 @@ int run_merge_labels(const MergeArguments& arguments, Console& console) {
                      .filters = arguments.filters,
                      .memory = arguments.memory,
                      .threads = arguments.threads,
-                     .force = arguments.force};
+                     .force = arguments.force,
+                     .no_space_check = arguments.no_space_check};
   check_label_output(output);
   if (!arguments.output.empty()) check_label_folder(output);
   const std::vector<fs::path> pieces(arguments.pieces.begin(), arguments.pieces.end());
   const LabelPiecesInfo info = read_label_pieces(pieces);
   check_replaces_no_input(output.folder, pieces);
   const WrittenLabels written =
-      write_labels(output, {info.name, info.level, info.labels},
-                   [&](int visits, const fs::path& folder, const LabelVisitor& visit) {
-                     return merge_label_pieces(pieces,
-                                               {.memory = arguments.memory,
-                                                .threads = arguments.threads,
-                                                .visits = visits,
-                                                .scratch_beside = folder},
-                                               visit, console.progress());
-                   });
+      write_labels(output, {info.name, info.level, info.labels}, [&](const LabelTarget& target) {
+        return merge_labels(output, pieces, target, console.progress());
+      });
   const LabelReport& report = written.report;
   console.result(
       {{"command", "merge"},
@@ -285,7 +280,7 @@ void add_merge(Program& program) {
   add_flag(app, "--quantize", arguments->quantize,
            "GLB with positions and normals of 16 bits (KHR_mesh_quantization)");
   add_flag(app, "--compress", arguments->compress,
-           "GLB compressed without loss (EXT_meshopt_compression)");
+           "GLB and 3D Tiles compressed without loss (EXT_meshopt_compression)");
   add_parsed(app, arguments->levels, parse_detail_levels,
              {"--levels", "auto|N",
               "Levels of detail of neuroglancer's format and 3D Tiles at most", "auto"});

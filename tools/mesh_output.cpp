@@ -72,6 +72,14 @@ std::uint64_t memory_of_file(const MeshForm& form, int threads, std::uint64_t me
                           {.compress = form.compress, .threads = threads, .memory = memory});
 }
 
+void check_compression(const MeshForm& form) {
+  if (form.compress && form.format != MeshFormat::glb && form.format != MeshFormat::tiles3d)
+    throw UsageError(fmt::format(
+        "--compress is for GLB and 3D Tiles only, and this mesh becomes {}: add --format glb or "
+        "3dtiles",
+        name_of(form.format)));
+}
+
 void check_levels(const MeshForm& form) {
   if (form.levels > 0 && !has_levels(form.format))
     throw UsageError(fmt::format(
@@ -94,9 +102,7 @@ MeshForm with_format(MeshForm form, const std::optional<MeshFormat>& named,
   if (form.quantize && form.format != MeshFormat::glb)
     throw UsageError(
         fmt::format("--quantize is for GLB only, and this mesh becomes {}", name_of(form.format)));
-  if (form.compress && form.format != MeshFormat::glb)
-    throw UsageError(
-        fmt::format("--compress is for GLB only, and this mesh becomes {}", name_of(form.format)));
+  check_compression(form);
   check_levels(form);
   check_attribute_format(form);
   return form;

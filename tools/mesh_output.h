@@ -14,7 +14,7 @@ struct MeshForm {
   MeshFormat format = MeshFormat::ply;
   bool normals = false;
   bool quantize = false;       ///< 16 bits a number; GLB only
-  bool compress = false;       ///< GLB only
+  bool compress = false;       ///< GLB and 3D Tiles only
   int levels = 0;              ///< of detail; 0: by the mesh
   bool sharded = false;        ///< neuroglancer only
   std::size_t attributes = 0;  ///< a float each at a vertex
@@ -29,6 +29,8 @@ MeshFormat parse_mesh_format(const std::string& text);
 /// What the file of such a mesh holds of a budget; see MeshSink::memory().
 std::uint64_t memory_of_file(const MeshForm& form, int threads, std::uint64_t memory);
 
+/// Throws UsageError for a compression that the format has not.
+void check_compression(const MeshForm& form);
 /// Throws UsageError for levels of detail and shards that the format has not.
 void check_levels(const MeshForm& form);
 

@@ -17,6 +17,8 @@ MeshBytes predict_bytes(const MeshForm& form, MeshSize size) {
   const std::uint64_t vectors = form.normals ? 2 : 1, v = size.vertices, t = size.triangles;
   const std::uint64_t attributes = v * form.attributes * sizeof(float);
   const std::uint64_t rows = v * vectors * vector + attributes;
+  // A triangle in scratch files.
+  const std::uint64_t numbers = v > kMaxNarrowVertices ? sizeof(WideTriangle) : triangle;
   // What waits in scratch files is on the disk twice for a moment.
   switch (form.format) {
     case MeshFormat::stl: return {header + t * 50, header + t * 50};
@@ -60,18 +62,35 @@ MeshBytes predict_bytes(const MeshForm& form, MeshSize size) {
     case MeshFormat::neuroglancer: {
       // A triangle takes about 2.5 bytes, and all coarser levels a third of level 0. Scratch files
       // hold the mesh, its simplification and sorted triangles.
-      const std::uint64_t file = header + t * 10 / 3, mesh = v * vector + t * triangle;
-      return {file, 2 * file + 2 * mesh + 2 * t * triangle + v * 24};
+      const std::uint64_t file = header + t * 10 / 3, mesh = v * vector + t * numbers;
+      return {file, 2 * file + 2 * mesh + 2 * t * numbers + v * 24};
     }
     case MeshFormat::tiles3d: {
       // Cuts at tiles add about a tenth, coarser levels a third, and a tile's JSON two bytes a
-      // triangle. Scratch files as above.
+      // triangle. Scratch files as above; compressed as GLB is.
       const std::uint64_t mesh = rows + t * triangle;
-      const std::uint64_t file = header + (mesh * 11 / 10 + 2 * t) * 4 / 3;
-      return {file, file + 2 * mesh + 2 * t * triangle + v * 24};
+      const std::uint64_t stored = form.compress ? v * (6 + (vectors - 1) * 10) + 2 * t : mesh;
+      const std::uint64_t file = header + (stored * 11 / 10 + 2 * t) * 4 / 3;
+      return {file, file + 2 * (rows + t * numbers) + 2 * t * numbers + v * 24};
     }
   }
   return {};
+}
+
+std::uint64_t predict_label_bytes(const MeshForm& form, const MeshFilterOptions& filter,
+                                  const LabelTotals& totals, int at_a_time) {
+  const auto scratch_of = [&](MeshSize size) {
+    const MeshBytes bytes = predict_bytes(form, size);
+    return bytes.needed - bytes.file + filter_scratch_bytes(filter, size, form.normals);
+  };
+  // Shards have their headers once; each label has a manifest in them and a line in the list.
+  const std::uint64_t header = predict_bytes(form, {}).file,
+                      each = form.sharded ? std::uint64_t{512} : header;
+  const std::uint64_t files = predict_bytes(form, totals.size).file +
+                              each * (totals.labels - std::min<std::uint64_t>(totals.labels, 1));
+  // No more at a time than all of them, and none larger than the largest.
+  return files + std::min(static_cast<std::uint64_t>(at_a_time) * scratch_of(totals.largest),
+                          scratch_of(totals.size));
 }
 
 std::uint64_t free_space(const fs::path& path) {
@@ -107,7 +126,7 @@ std::optional<Shortage> find_shortage(
 }
 
 bool needs_pieces(const PlannedMesh& mesh, std::uint64_t max_narrow) {
-  return takes_wide(mesh.form.format) && !mesh.filter.changes_mesh() && !mesh.filter.measure &&
+  return (takes_wide(mesh.form.format) || mesh.filter.makes_smaller()) &&
          static_cast<double>(mesh.size.vertices) * (1 + mesh.uncertainty) >
              static_cast<double>(max_narrow);
 }

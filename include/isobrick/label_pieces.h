@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <span>
 #include <stop_token>
@@ -63,6 +64,7 @@ struct LabelMergeOptions {
   int visits = 0;                              ///< meshes at the same time; 0: as many as threads
   std::filesystem::path scratch_beside = "-";  ///< where the scratch file lies
   std::stop_token cancel = {};                 ///< ends the operation with Cancelled
+  std::function<void(const LabelTotals&)> check_totals = {};  ///< called before the first mesh
 };
 
 /// Puts the pieces together and calls `visit` as extract_labels() does, with the same meshes.

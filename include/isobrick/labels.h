@@ -22,6 +22,13 @@ struct LabelRange {
   std::int64_t last = 0;   ///< the largest label
 };
 
+/// What the meshes of all labels are together.
+struct LabelTotals {
+  std::uint64_t labels = 0;  ///< that have a mesh
+  MeshSize size;             ///< of all meshes
+  MeshSize largest;          ///< the most vertices, and the most triangles, of one mesh
+};
+
 /// Which labels of a label image get a mesh, and with what means.
 struct LabelOptions {
   std::vector<LabelRange> labels = {};  ///< none: all but `background`
@@ -44,6 +51,8 @@ struct LabelOptions {
   std::filesystem::path scratch_beside = "-";
   /// Ends the operation with Cancelled, soon after a stop is requested on any thread.
   std::stop_token cancel = {};
+  /// Called once, before the first mesh is passed on. What it throws ends the operation.
+  std::function<void(const LabelTotals&)> check_totals = {};
 };
 
 /// The mesh of one label.

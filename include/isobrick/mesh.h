@@ -20,6 +20,8 @@ namespace isobrick::inline v0 {
 using Triangle = std::array<std::uint32_t, 3>;
 /// The same in a mesh of more vertices than 32 bits number.
 using WideTriangle = std::array<std::uint64_t, 3>;
+/// Vertices that numbers of 32 bits can name.
+inline constexpr std::uint64_t kMaxNarrowVertices = 0xffff'ffff;
 
 /// sRGB, a byte each; the fourth is not used.
 using VertexColour = std::array<std::uint8_t, 4>;

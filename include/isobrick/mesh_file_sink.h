@@ -29,8 +29,8 @@ ISOBRICK_API bool has_normals(MeshFormat format);
 ISOBRICK_API bool has_vertices(MeshFormat format);
 /// Whether it holds MeshChunk::attributes: PLY, GLB, VTP and PVTP do. Others ignore them.
 ISOBRICK_API bool has_attributes(MeshFormat format);
-/// Whether it holds meshes of more vertices than 32 bits number (MeshHeader::wide): OBJ, GLB, VTP
-/// and PVTP do.
+/// Whether it holds meshes of more vertices than 32 bits number (MeshHeader::wide): all but PLY and
+/// STL do.
 ISOBRICK_API bool takes_wide(MeshFormat format);
 /// Whether it is a folder with the mesh at several levels of detail: neuroglancer and 3D Tiles are.
 ISOBRICK_API bool has_levels(MeshFormat format);
@@ -42,8 +42,8 @@ inline constexpr int kMaxMeshLevels = 16;
 struct MeshFileOptions {
   std::optional<MeshFormat> format = {};  ///< nullopt: by the name's extension
   bool quantize = false;                  ///< GLB: 16 bits a number (KHR_mesh_quantization)
-  /// GLB: compressed without loss (EXT_meshopt_compression), beside `quantize` or alone. Throws
-  /// UsageError in a build without meshoptimizer.
+  /// GLB, beside `quantize` or alone, and 3D Tiles: compressed without loss
+  /// (EXT_meshopt_compression). Throws UsageError in a build without meshoptimizer.
   bool compress = false;
   /// Of formats with levels of detail: how many at most, 1 to kMaxMeshLevels. Each has a quarter of
   /// the triangles of the one before. 0: until one part has the whole mesh.

@@ -79,11 +79,11 @@ struct MeshFilterOptions {
   Progress* progress = nullptr;
 
   /// Whether the mesh that leaves may be another one than that which enters.
-  bool changes_mesh() const {
-    return min_component > 1 || largest > 0 || smooth > 0 || simplifies();
-  }
+  bool changes_mesh() const { return smooth > 0 || makes_smaller(); }
   /// Whether triangles are to become fewer.
   bool simplifies() const { return simplify_ratio < 1 || simplify_triangles > 0 || max_error > 0; }
+  /// Whether the mesh that leaves is mostly smaller than that which enters.
+  bool makes_smaller() const { return min_component > 1 || largest > 0 || simplifies(); }
   /// Whether there is anything to do.
   bool any() const { return changes_mesh() || measure || !unit.empty(); }
 };
@@ -108,11 +108,12 @@ class ISOBRICK_API MeshFilter final : public MeshSink {
 
   /// Welded, but that of the sink where there is nothing to do and `takes_welded` is not set.
   Indexing indexing() const override;
-  /// What the sink says, where no filter changes or measures the mesh.
+  /// What the sink says, or true where a filter makes the mesh smaller.
   bool takes_wide() const override;
   void begin(const MeshHeader& header) override;
-  /// Throws Error for a mesh of more than 2³² − 1 vertices.
+  /// Throws Error for more than kMaxNarrowVertices vertices where MeshHeader::wide is not set.
   void write(const MeshChunk& chunk) override;
+  /// Throws Error where the sink does not take as many vertices as are left.
   void finish() override;
   std::uint64_t bytes() const override;
   std::uint64_t memory() const override;

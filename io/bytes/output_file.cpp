@@ -12,6 +12,7 @@
 #include <cstring>
 #include <filesystem>
 #include <new>
+#include <stdexcept>
 
 #include <isobrick/error.h>
 #include "io/bytes/leftovers.h"
@@ -49,6 +50,7 @@ void FileWriter::make_buffer(std::size_t capacity) {
 
 std::byte* FileWriter::reserve(std::size_t size) {
   if (used_ + size > capacity_) flush();
+  if (size > capacity_) throw std::length_error("more bytes are reserved than a buffer has");
   return buffer_.get() + used_;
 }
 

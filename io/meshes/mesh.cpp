@@ -8,6 +8,7 @@
 #include <isobrick/error.h>
 #include <isobrick/mesh_file_sink.h>
 #include <isobrick/progress.h>
+#include "io/meshes/mesh_writing.h"
 
 namespace isobrick::inline v0 {
 namespace {
@@ -95,6 +96,23 @@ void check_attributes(const Mesh& mesh, Attributes attributes, const std::filesy
 
 }  // namespace
 
+void write_mesh(const Mesh& mesh, std::span<const VertexAttribute> attributes, MeshSink& sink,
+                Progress& progress) {
+  const bool is_welded = sink.indexing() == Indexing::welded;
+  progress.begin("saving", mesh.triangles.size() * sizeof(Triangle) +
+                               (is_welded ? mesh.positions.size() * sizeof(Vec3f) : 0));
+  MeshHeader header = header_of_mesh(mesh);
+  for (const VertexAttribute& attribute : attributes)
+    header.attributes.emplace_back(attribute.name);
+  sink.begin(header);
+  if (is_welded)
+    write_welded(mesh, attributes, sink, progress);
+  else
+    write_unwelded(mesh, sink, progress);
+  progress.end();
+  sink.finish();
+}
+
 void Mesh::save(const std::filesystem::path& path) const { save(path, {}); }
 
 void Mesh::save(const std::filesystem::path& path, const MeshFileOptions& options) const {
@@ -111,20 +129,7 @@ void Mesh::save(const std::filesystem::path& path, const MeshFileOptions& option
   check_attributes(*this, attributes, path, options);
   MeshFileOptions heard = options;
   if (!heard.progress) heard.progress = &progress;
-  const std::unique_ptr<MeshSink> sink = create_mesh_file(path, heard);
-  const bool is_welded = sink->indexing() == Indexing::welded;
-  progress.begin("saving", triangles.size() * sizeof(Triangle) +
-                               (is_welded ? positions.size() * sizeof(Vec3f) : 0));
-  MeshHeader header = header_of_mesh(*this);
-  for (const VertexAttribute& attribute : attributes)
-    header.attributes.emplace_back(attribute.name);
-  sink->begin(header);
-  if (is_welded)
-    write_welded(*this, attributes, *sink, progress);
-  else
-    write_unwelded(*this, *sink, progress);
-  progress.end();
-  sink->finish();
+  write_mesh(*this, attributes, *create_mesh_file(path, heard), progress);
 }
 
 }  // namespace isobrick

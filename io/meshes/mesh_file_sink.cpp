@@ -90,7 +90,7 @@ bool has_vertices(MeshFormat format) { return format != MeshFormat::stl; }
 
 bool takes_wide(MeshFormat format) {
   return format == MeshFormat::obj || format == MeshFormat::glb || format == MeshFormat::vtp ||
-         format == MeshFormat::pvtp;
+         format == MeshFormat::pvtp || has_levels(format);
 }
 
 bool has_attributes(MeshFormat format) {
@@ -127,12 +127,14 @@ std::unique_ptr<MeshSink> create_mesh_file(const std::filesystem::path& path,
                                         PvtpSink::threads_within(options.threads, options.memory));
     case MeshFormat::neuroglancer:
     case MeshFormat::tiles3d:
-      return create_level_mesh(
-          path, force, {.as_tiles = *format == MeshFormat::tiles3d, .sharded = options.sharded},
-          {.levels = options.levels,
-           .threads = options.threads,
-           .memory = level_share(options.memory),
-           .progress = options.progress});
+      return create_level_mesh(path, force,
+                               {.as_tiles = *format == MeshFormat::tiles3d,
+                                .compress = options.compress,
+                                .sharded = options.sharded},
+                               {.levels = options.levels,
+                                .threads = options.threads,
+                                .memory = level_share(options.memory),
+                                .progress = options.progress});
   }
   throw UsageError("no such format of a mesh");
 }

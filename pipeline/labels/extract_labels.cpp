@@ -14,8 +14,8 @@ LabelReport extract_labels(const StoreReader& reader, const LabelOptions& option
     const Stopwatch watch(read.seconds);
     const LabelImage image = label_image_of(store, options);
     const LabelPlan plan = plan_label_memory(store, options);
-    LabelMeshes meshes(image,
-                       {options.scratch_beside, plan.label_bytes, plan.meshes, options.cancel});
+    LabelMeshes meshes(image, {options.scratch_beside, plan.label_bytes, plan.meshes,
+                               options.cancel, options.check_totals});
     const LabelReport pass = run_label_pass(
         store, options, image, plan, {},
         [&](std::span<const std::byte> packed) { meshes.append(packed); }, progress);

@@ -81,8 +81,8 @@ LabelReport extract_labels(const Volume& volume, const LabelOptions& options,
                            .roi = options.roi.value_or(samples.lattice.box()),
                            .labels = {options.labels, options.background, samples.lattice.type},
                            .smoothing = label_smoothing(options)};
-    LabelMeshes meshes(image,
-                       {options.scratch_beside, plan.label_bytes, plan.meshes, options.cancel});
+    LabelMeshes meshes(image, {options.scratch_beside, plan.label_bytes, plan.meshes,
+                               options.cancel, options.check_totals});
     LabelPass pass(
         image, options, plan, [&](std::span<const std::byte> packed) { meshes.append(packed); },
         progress);

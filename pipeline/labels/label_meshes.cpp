@@ -12,6 +12,21 @@
 #include "pipeline/labels/label_mesh.h"
 
 namespace isobrick::inline v0 {
+namespace {
+
+LabelTotals add_up(const std::vector<LabelChain>& chains) {
+  LabelTotals totals{.labels = chains.size()};
+  for (const LabelChain& chain : chains) {
+    const MeshSize size{chain.vertices, 2 * chain.quads};
+    totals.size.vertices += size.vertices;
+    totals.size.triangles += size.triangles;
+    totals.largest.vertices = std::max(totals.largest.vertices, size.vertices);
+    totals.largest.triangles = std::max(totals.largest.triangles, size.triangles);
+  }
+  return totals;
+}
+
+}  // namespace
 
 void LabelMeshes::append(std::span<const std::byte> packed) {
   spool_.append(packed);
@@ -69,7 +84,7 @@ void LabelMeshes::pass_on(const std::vector<LabelChain>& chains, const LabelVisi
       },
       [&](std::size_t& i) {
         visit(SpooledLabelMesh(spool_, chains[i], i, image_.transform, header_of(chains[i]),
-                               plan_.cancel));
+                               plan_.cancel, plan_.max_narrow_vertices));
       },
       [&](std::size_t& i) { progress.advance(2 * chains[i].quads * sizeof(Triangle)); });
   progress.end();
@@ -81,11 +96,11 @@ LabelReport LabelMeshes::finish(Workers& workers, const LabelVisitor& visit, Pro
   report.scratch_bytes = spool_.bytes();
   const std::vector<LabelChain> chains = spool_.finish();
   check_named(chains);
-  for (const LabelChain& chain : chains) {
-    ++report.labels;
-    report.vertices += chain.vertices;
-    report.triangles += 2 * chain.quads;
-  }
+  const LabelTotals totals = add_up(chains);
+  report.labels = totals.labels;
+  report.vertices = totals.size.vertices;
+  report.triangles = totals.size.triangles;
+  if (plan_.check_totals) plan_.check_totals(totals);
   const Stopwatch watch(report.write_seconds);
   workers.execute([&] { pass_on(chains, visit, cancellable); });
   return report;

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <span>
 #include <stop_token>
 #include <vector>
@@ -24,6 +25,8 @@ class LabelMeshes {
     std::uint64_t label_bytes = 0;  ///< for what is known of each label
     std::size_t at_a_time = 1;      ///< meshes that are passed on
     std::stop_token cancel = {};
+    std::function<void(const LabelTotals&)> check_totals = {};  ///< of LabelOptions
+    std::uint64_t max_narrow_vertices = kMaxNarrowVertices;     ///< a test has fewer
   };
 
   /// `image` must outlive it.

@@ -88,7 +88,8 @@ LabelReport merge_label_pieces(std::span<const fs::path> pieces, const LabelMerg
     LabelMeshes meshes(image, {.scratch_beside = options.scratch_beside,
                                .label_bytes = plan_label_bytes(all, options.memory),
                                .at_a_time = static_cast<std::size_t>(visits),
-                               .cancel = options.cancel});
+                               .cancel = options.cancel,
+                               .check_totals = options.check_totals});
     CancellableProgress cancellable(progress, options.cancel);
     cancellable.begin("merging", all.set.bytes);
     for (const PieceSet::Piece& piece : all.set.pieces) append_piece(piece, meshes, cancellable);

@@ -1,14 +1,10 @@
 #pragma once
 
 #include <cstdint>
-#include <limits>
 
 #include <isobrick/pieces.h>
 
 namespace isobrick::inline v0 {
-
-/// Vertices that numbers of 32 bits can name.
-inline constexpr std::uint64_t kMaxNarrowVertices = std::numeric_limits<std::uint32_t>::max();
 
 /// What merge_pieces() does, for a test with another limit than kMaxNarrowVertices: a mesh of more
 /// vertices has numbers of 64 bits.

@@ -186,7 +186,8 @@ PiecesInfo merge_pieces_within(std::uint64_t max_narrow_vertices, std::span<cons
   if (header.wide && !sink.takes_wide())
     throw Error(fmt::format(
         "the mesh has more than {} vertices, which this output cannot number: choose PVTP, VTP, "
-        "OBJ or GLB without filters, regions (--roi) or a coarser --level",
+        "OBJ, GLB or levels of detail, a filter that makes it smaller, regions (--roi) or a "
+        "coarser --level",
         max_narrow_vertices));
   const std::uint64_t chunk_bytes = plan_chunk(all, header.wide, sink.memory(), options);
   CancellableProgress cancellable(progress, options.cancel);

@@ -27,7 +27,7 @@ from ._mesh import Measure, Mesh
 from ._open import open
 from ._operations import convert, export, index, info, recode, synth, verify
 from ._picture import Picture, render
-from ._pieces import merge
+from ._pieces import merge, merge_labels
 from ._volume import Histogram, Level, Volume
 
 __all__ = [
@@ -54,6 +54,7 @@ __all__ = [
     "info",
     "marching_cubes",
     "merge",
+    "merge_labels",
     "open",
     "recode",
     "render",

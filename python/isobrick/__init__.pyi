@@ -15,6 +15,8 @@ _Progress = Union[Callable[[str, int, int], object], Any, None]
 _Inside = Literal["above", "below"]
 _Topology = Literal["consistent", "trilinear"]
 _Backend = Literal["auto", "cpu", "cuda"]
+_ColourBy = Union[str, tuple[str, float, float], None]
+_ColourMap = Literal["viridis", "coolwarm", "grey"]
 _Rotation = Union[Sequence[float], Sequence[Sequence[float]], NDArray[np.floating[Any]], None]
 _Numbers = Optional[Sequence[float]]
 _Isovalue = Union[str, float]
@@ -70,6 +72,8 @@ class Mesh:
         compress: bool = False,
         levels: Optional[int] = None,
         sharded: bool = False,
+        colour_by: _ColourBy = None,
+        colour_map: Optional[_ColourMap] = None,
         progress: _Progress = None,
     ) -> None: ...
     def filtered(
@@ -525,6 +529,8 @@ class Volume:
         quantize: bool = False,
         compress: bool = False,
         attributes: Optional[Mapping[str, Union[Volume, _Path]]] = None,
+        colour_by: _ColourBy = None,
+        colour_map: Optional[_ColourMap] = None,
     ) -> dict[str, Any]: ...
     def extract_piece(
         self,
@@ -539,6 +545,22 @@ class Volume:
         drop_degenerate: bool = False,
         topology: _Topology = "consistent",
         cap: bool = False,
+        memory: _Bytes = ...,
+        threads: int = 0,
+        progress: _Progress = None,
+        force: bool = False,
+    ) -> dict[str, Any]: ...
+    def extract_label_piece(
+        self,
+        path: _Path,
+        part: tuple[int, int],
+        labels: Union[int, Sequence[int], ArrayLike, None] = None,
+        *,
+        level: int = 0,
+        roi: _Roi = None,
+        background: int = 0,
+        smooth: int = 0,
+        pass_band: float = 0.1,
         memory: _Bytes = ...,
         threads: int = 0,
         progress: _Progress = None,
@@ -657,6 +679,13 @@ def merge(
     levels: Optional[int] = None,
     sharded: bool = False,
 ) -> dict[str, Any]: ...
+def merge_labels(
+    pieces: Sequence[_Path],
+    *,
+    memory: _Bytes = ...,
+    threads: int = 0,
+    progress: _Progress = None,
+) -> dict[int, Mesh]: ...
 def recode(
     source: _Path,
     path: _Path,
@@ -670,7 +699,7 @@ def recode(
 ) -> dict[str, Any]: ...
 def index(
     path: _Path,
-    kind: Literal["linear", "interval", "kdtree", "quadtree", "octree"] = "octree",
+    kind: Literal["linear", "interval", "kdtree", "quadtree", "octree", "labels"] = "octree",
     *,
     leaf: int = 16,
     channel: Optional[int] = None,

@@ -283,6 +283,41 @@ def attribute_name(name):
     return name
 
 
+def colour_arguments(colour_by, colour_map, names, range_of):
+    """What the C++ layer takes as colours of an attribute; None: none.
+
+    `names` are those of the attributes. `range_of(name)` is asked where no range is given; None or
+    equal values are not enough.
+    """
+    if colour_by is None:
+        if colour_map is not None:
+            raise UsageError("colour_map is of colour_by: name an attribute")
+        return None
+    if isinstance(colour_by, str):
+        name, ends = colour_by, None
+    else:
+        try:
+            name, *ends = colour_by
+        except TypeError:
+            ends = ()
+        if len(ends) != 2:
+            raise UsageError(
+                "colour_by must be the name of an attribute, or (name, low, high), not "
+                f"{colour_by!r}"
+            )
+    if name not in names:
+        raise UsageError(f"colour_by: there is no attribute {name!r}")
+    if ends is None:
+        ends = range_of(name)
+        if ends is None or not (-math.inf < ends[0] < ends[1] < math.inf):
+            raise UsageError(
+                f"colour_by: the range of {name!r} is not known, or is a single value: give it, as "
+                f"in ({name!r}, 0, 1)"
+            )
+    low, high = (number(end, "colour_by") for end in ends)
+    return name, low, high, "viridis" if colour_map is None else str(colour_map)
+
+
 def mesh_file_options(
     *, force=False, quantize=False, compress=False, threads=0, memory=2**30, levels=None,
     sharded=False,

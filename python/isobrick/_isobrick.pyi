@@ -141,6 +141,7 @@ class Mesh:
         self,
         path: str,
         attributes: list[tuple[str, NDArray[np.float32]]],
+        colours: Optional[tuple[str, float, float, str]],
         options: MeshFileOptions,
         report: Report,
     ) -> None: ...
@@ -250,6 +251,7 @@ class Store:
         path: str,
         file: MeshFileOptions,
         attributes: list[tuple[str, Store]],
+        colours: Optional[tuple[str, float, float, str]],
         report: Report,
     ) -> dict[str, Any]: ...
     def estimate(self, options: ExtractOptions) -> dict[str, Any]: ...
@@ -327,6 +329,18 @@ def merge_to_file(
     file: MeshFileOptions,
     report: Report,
 ) -> dict[str, Any]: ...
+def extract_label_piece(
+    volume: Store,
+    options: LabelOptions,
+    number: int,
+    count: int,
+    path: str,
+    force: bool,
+    report: Report,
+) -> dict[str, Any]: ...
+def merge_labels(
+    pieces: list[str], memory: int, threads: int, report: Report
+) -> dict[int, Mesh]: ...
 def index(
     path: str,
     kind: str,

@@ -7,7 +7,7 @@ import numpy as np
 
 from . import _isobrick
 from ._arguments import (
-    attribute_name, filter_options, mesh_file_options, path_text, unit_text,
+    attribute_name, colour_arguments, filter_options, mesh_file_options, path_text, unit_text,
 )
 from ._errors import UsageError
 from ._progress import reporting
@@ -134,7 +134,7 @@ class Mesh:
 
     def save(
         self, path, *, force=False, quantize=False, compress=False, levels=None, sharded=False,
-        progress=None,
+        colour_by=None, colour_map=None, progress=None,
     ):
         """Writes a mesh file.
 
@@ -148,12 +148,17 @@ class Mesh:
         quantize : bool
             GLB only: 16 bits a coordinate.
         compress : bool
-            GLB only: compressed without loss (EXT_meshopt_compression).
+            GLB and 3D Tiles: compressed without loss (EXT_meshopt_compression).
         levels : int, optional
             neuroglancer and 3D Tiles only: levels of detail at most; by default until one part has
             the whole mesh.
         sharded : bool
             neuroglancer only: few large files.
+        colour_by : str or (str, float, float), optional
+            GLB and PLY only: colours of the vertices by one of the `attributes`, and the values with
+            the first and the last colour. By default they are its smallest and its largest one.
+        colour_map : "viridis", "coolwarm" or "grey", optional
+            The scale of these colours: viridis, unless it is given.
         progress : function or tqdm, optional
             A function of (stage, done, total) in bytes, a tqdm bar, or the class `tqdm`.
 
@@ -167,8 +172,15 @@ class Mesh:
             (attribute_name(name), self._values(name, values))
             for name, values in self._attributes.items()
         ]
+        colours = colour_arguments(colour_by, colour_map, self._attributes, self._range_of)
         with reporting(progress) as report:
-            self._native.save(path_text(path), attributes, options, report)
+            self._native.save(path_text(path), attributes, colours, options, report)
+
+    def _range_of(self, name):
+        """The smallest and the largest finite value of an attribute, or None."""
+        values = self._values(name, self._attributes[name])
+        values = values[np.isfinite(values)]
+        return (float(values.min()), float(values.max())) if values.size else None
 
     def _values(self, name, values):
         """The values of an attribute as the files have them."""

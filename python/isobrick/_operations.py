@@ -145,10 +145,11 @@ def index(
     ----------
     path : str or path
         The store.
-    kind : "linear", "interval", "kdtree", "quadtree" or "octree"
-        The structure.
+    kind : "linear", "interval", "kdtree", "quadtree", "octree" or "labels"
+        The structure. "labels": lists of the labels in each brick of a label image, by which
+        `Volume.extract_labels` of some labels reads the bricks that these lie in.
     leaf : int
-        Cells along each edge of an item: 1, 2, 4, 8 or 16.
+        Cells along each edge of an item: 1, 2, 4, 8 or 16. Lists of labels have none.
     channel, time : int, optional
         Which volume of an image with several.
     resume, force, memory, threads, progress

@@ -1,12 +1,14 @@
 """Surfaces that many tasks make: pieces, and what puts them together."""
 
 from . import _isobrick
-from ._arguments import byte_count, filter_options, integer, mesh_file_options, path_text
+from ._arguments import (
+    byte_count, filter_options, integer, mesh_file_options, path_text, thread_count,
+)
 from ._errors import UsageError
-from ._mesh import Mesh, with_measure
+from ._mesh import Mesh, meshes_of, with_measure
 from ._progress import reporting
 
-__all__ = ["merge"]
+__all__ = ["merge", "merge_labels"]
 
 
 def part_numbers(part):
@@ -17,6 +19,12 @@ def part_numbers(part):
         raise UsageError(f"part must be (number, count), such as (3, 8), not {part!r}") from None
     most = 2**32 - 1
     return integer(number, "part", 0, most), integer(count, "part", 0, most)
+
+
+def _piece_names(pieces):
+    if isinstance(pieces, (str, bytes)):
+        raise UsageError("pieces must be a list of files, not one text")
+    return [path_text(piece) for piece in pieces]
 
 
 def merge(
@@ -44,9 +52,7 @@ def merge(
 
     Returns a `Mesh`, or of a file a dictionary: vertices, faces, and with `measure` a `Measure`.
     """
-    if isinstance(pieces, (str, bytes)):
-        raise UsageError("pieces must be a list of files, not one text")
-    names = [path_text(piece) for piece in pieces]
+    names = _piece_names(pieces)
     filters = filter_options(
         min_component=min_component, largest=largest, smooth=smooth, pass_band=pass_band,
         simplify=simplify, max_error=max_error, threads=threads, measure=measure,
@@ -63,4 +69,25 @@ def merge(
     with reporting(progress) as report:
         return with_measure(
             _isobrick.merge_to_file(names, filters, path_text(path), file, report)
+        )
+
+
+def merge_labels(pieces, *, memory=2**30, threads=0, progress=None):
+    """Puts the pieces of labels together, of `Volume.extract_label_piece` or of the program.
+
+    Parameters
+    ----------
+    pieces : list of str or path
+        All pieces of the same labels, in any order.
+    memory, threads, progress
+        As of `Volume.extract_labels`.
+
+    Returns a dictionary from labels to `Mesh`: that of `Volume.extract_labels`, byte for byte. All
+    meshes are in memory; `isobrick merge` streams them to files.
+    """
+    with reporting(progress) as report:
+        return meshes_of(
+            _isobrick.merge_labels(
+                _piece_names(pieces), byte_count(memory), thread_count(threads), report
+            )
         )

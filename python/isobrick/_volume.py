@@ -7,8 +7,9 @@ import numpy as np
 
 from . import _isobrick
 from ._arguments import (
-    attribute_name, box_of, byte_count, extract_options, filter_options, histogram_bins, integer, is_list,
-    label_options, mesh_file_options, number, one_isovalue, path_text, thread_count, unit_text,
+    attribute_name, box_of, byte_count, colour_arguments, extract_options, filter_options,
+    histogram_bins, integer, is_list, label_options, mesh_file_options, number, one_isovalue,
+    path_text, thread_count, unit_text,
 )
 from ._device import DeviceMesh, DeviceVolume, stream_number
 from ._errors import UsageError
@@ -368,11 +369,12 @@ class Volume:
         drop_degenerate=False, topology="consistent", cap=False, min_component=0, largest=0,
         smooth=0, pass_band=0.1, simplify=None, max_error=None, measure=False, backend="auto",
         memory=2**30, threads=0, gpu_memory=0, device=0, progress=None, force=False,
-        quantize=False, compress=False, attributes=None,
+        quantize=False, compress=False, attributes=None, colour_by=None, colour_map=None,
     ):
         """Streams a surface to a mesh file, so that volume and mesh may be larger than memory.
 
-        The arguments are those of `extract` and of `Mesh.save`. Returns a dictionary of what was
+        The arguments are those of `extract` and of `Mesh.save`; `colour_by` without a range reaches
+        over all samples of the attribute's volume. Returns a dictionary of what was
         done: vertices, faces, bricks, bricks_read, bytes_read, backend, seconds, and with
         `measure` a `Measure` of the mesh.
         """
@@ -390,11 +392,14 @@ class Volume:
             force=force, quantize=quantize, compress=compress, threads=threads, memory=memory
         )
         others = _attribute_volumes(attributes)
+        colours = colour_arguments(
+            colour_by, colour_map, others, lambda name: others[name].range
+        )
         with reporting(progress) as report:
             return with_measure(
                 self._native.save_mesh(
                     options, filters, path_text(path), file,
-                    [(name, other._native) for name, other in others.items()], report,
+                    [(name, other._native) for name, other in others.items()], colours, report,
                 )
             )
 
@@ -429,6 +434,39 @@ class Volume:
         )
         with reporting(progress) as report:
             return _isobrick.extract_piece(
+                self._native, options, *part_numbers(part), path_text(path), bool(force), report
+            )
+
+    def extract_label_piece(
+        self, path, part, labels=None, *, level=0, roi=None, background=0, smooth=0, pass_band=0.1,
+        memory=2**30, threads=0, progress=None, force=False,
+    ):
+        """What a part of the volume has of all labels, as a file for `isobrick.merge_labels`.
+
+        Tasks on many machines may each make a part; they need to know nothing of each other.
+
+        Parameters
+        ----------
+        path : str or path
+            The piece, such as "cells_3of8.piece". One that is there, whole and the same, is kept.
+        part : (int, int)
+            Which part of how many: (3, 8) is the third of eight.
+        labels, level, roi, background, smooth, pass_band
+            As of `extract_labels`, the same for all parts.
+        memory, threads, progress
+            As of `extract_labels`.
+        force : bool
+            Replaces a file that is no piece.
+
+        Returns a dictionary: vertices, faces, bytes, and whether it was kept.
+        """
+        options = label_options(
+            labels, background=background, level=level,
+            box=box_of(roi, self._level(level).shape), smooth=smooth, pass_band=pass_band,
+            memory=memory, threads=threads,
+        )
+        with reporting(progress) as report:
+            return _isobrick.extract_label_piece(
                 self._native, options, *part_numbers(part), path_text(path), bool(force), report
             )
 

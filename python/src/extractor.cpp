@@ -57,11 +57,12 @@ class ArrayExtractor {
   }
 
   py::dict extract_labels(const LabelOptions& options, const py::object& callback) {
-    return label_meshes(options, callback,
-                        [&](const LabelOptions& o, const LabelVisitor& visit, Progress& progress) {
-                          const std::lock_guard lock(mutex_);
-                          isobrick::extract_labels(volume_, o, visit, progress);
-                        });
+    return label_meshes(callback, [&](const LabelVisitor& visit, const Reporter& reporter) {
+      const std::lock_guard lock(mutex_);
+      LabelOptions cancellable = options;
+      cancellable.cancel = reporter.cancel;
+      isobrick::extract_labels(volume_, cancellable, visit, reporter.progress);
+    });
   }
 
   std::pair<Vec3d, Vec3d> bounds(ExtractOptions options) {

@@ -6,18 +6,14 @@
 #include <utility>
 
 #include <isobrick/mesh_sinks.h>
-#include "python/src/interruptible.h"
 
 namespace isobrick::python {
 
-py::dict label_meshes(LabelOptions options, const py::object& callback,
-                      const ExtractLabels& extract) {
+py::dict label_meshes(const py::object& callback, const MakeLabelMeshes& make) {
   std::map<std::int64_t, std::unique_ptr<Mesh>> meshes;
   run_interruptibly(callback, [&](Reporter reporter) {
-    options.cancel = reporter.cancel;
     std::mutex mutex;
-    extract(
-        options,
+    make(
         [&](const LabelMesh& label) {
           auto mesh = std::make_unique<Mesh>();
           MemorySink sink(*mesh);
@@ -25,7 +21,7 @@ py::dict label_meshes(LabelOptions options, const py::object& callback,
           const std::lock_guard lock(mutex);
           meshes.emplace(label.label(), std::move(mesh));
         },
-        reporter.progress);
+        reporter);
   });
   py::dict result;
   for (auto& [label, mesh] : meshes) result[py::int_(label)] = py::cast(std::move(mesh));

@@ -5,15 +5,14 @@
 #include <functional>
 
 #include <isobrick/labels.h>
+#include "python/src/interruptible.h"
 
 namespace isobrick::python {
 
-/// Passes the meshes of labels to a visitor, and reports progress.
-using ExtractLabels =
-    std::function<void(const LabelOptions& options, const LabelVisitor& visit, Progress& progress)>;
+/// Makes the meshes of labels and passes them to a visitor.
+using MakeLabelMeshes = std::function<void(const LabelVisitor& visit, const Reporter& reporter)>;
 
 /// The meshes of labels in memory: a dictionary from labels, in ascending order, to meshes.
-pybind11::dict label_meshes(LabelOptions options, const pybind11::object& callback,
-                            const ExtractLabels& extract);
+pybind11::dict label_meshes(const pybind11::object& callback, const MakeLabelMeshes& make);
 
 }  // namespace isobrick::python

@@ -7,6 +7,7 @@
 #include <cstring>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -18,8 +19,10 @@
 #include <isobrick/mesh_file_sink.h>
 #include <isobrick/mesh_filters.h>
 #include "core/box_union.h"
+#include "io/meshes/mesh_writing.h"
 #include "python/src/bindings.h"
 #include "python/src/casters.h"
+#include "python/src/colours.h"
 #include "python/src/filtered.h"
 #include "python/src/interruptible.h"
 
@@ -140,7 +143,9 @@ using FloatArray = py::array_t<float, py::array::c_style>;
 /// `attributes`: a value a vertex each.
 void save_mesh_file(const Mesh& mesh, const std::string& path,
                     const std::vector<std::pair<std::string, FloatArray>>& attributes,
-                    const MeshFileOptions& options, const py::object& callback) {
+                    const ColourArguments& colour_arguments, const MeshFileOptions& options,
+                    const py::object& callback) {
+  const std::optional<AttributeColours> colours = colours_of(colour_arguments, path);
   std::vector<std::string> names;
   std::vector<VertexAttribute> views;
   for (const auto& [name, values] : attributes) {
@@ -150,7 +155,12 @@ void save_mesh_file(const Mesh& mesh, const std::string& path,
   check_attribute_names(names);
   run_interruptibly(callback, [&](Reporter reporter) {
     check_faces(mesh);
-    mesh.save(path, options, reporter.progress, views);
+    if (!colours) return mesh.save(path, options, reporter.progress, views);
+    MeshFileOptions heard = options;
+    heard.progress = &reporter.progress;
+    const std::unique_ptr<MeshSink> sink = create_mesh_file(path, heard);
+    ColourSink coloured(*sink, *colours);
+    write_mesh(mesh, views, coloured, reporter.progress);
   });
 }
 

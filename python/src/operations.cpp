@@ -9,6 +9,7 @@
 #include <isobrick/convert.h>
 #include <isobrick/error.h>
 #include <isobrick/index_build.h>
+#include <isobrick/label_index.h>
 #include <isobrick/open_source.h>
 #include <isobrick/recode.h>
 #include <isobrick/synth_source.h>
@@ -109,11 +110,36 @@ py::dict recode_store(const std::string& path, const std::string& out,
   }));
 }
 
+py::dict describe_index(const IndexReport& report) {
+  return py::dict(py::arg("level_bytes") = report.level_bytes,
+                  py::arg("ranges_added") = report.ranges_added,
+                  py::arg("seconds") = report.seconds);
+}
+
+/// Lists of labels, which have no leaf.
+py::dict index_labels(const std::string& path, Index leaf, const VolumeRequest& request,
+                      bool resume, bool force, const py::object& callback) {
+  if (leaf != IndexOptions().leaf)
+    throw UsageError("lists of labels are of 32 cells along each edge: leave out leaf");
+  return describe_index(interruptible(callback, [&](Reporter reporter) {
+    return add_label_index(path,
+                           {.selection = request.selection,
+                            .memory = request.memory.value_or(std::uint64_t{1} << 30),
+                            .threads = request.threads,
+                            .resume = resume,
+                            .force = force,
+                            .cancel = reporter.cancel},
+                           reporter.progress);
+  }));
+}
+
 py::dict index_store(const std::string& path, const std::string& kind, Index leaf,
                      const VolumeRequest& request, bool resume, bool force,
                      const py::object& callback) {
+  if (kind == "labels") return index_labels(path, leaf, request, resume, force, callback);
   const auto parsed = parse_index_kind(kind);
-  if (!parsed) throw UsageError("the kinds are linear, interval, kdtree, quadtree and octree");
+  if (!parsed)
+    throw UsageError("the kinds are linear, interval, kdtree, quadtree, octree and labels");
   const IndexOptions options{.kind = *parsed,
                              .selection = request.selection,
                              .leaf = leaf,
@@ -121,11 +147,8 @@ py::dict index_store(const std::string& path, const std::string& kind, Index lea
                              .threads = request.threads,
                              .resume = resume,
                              .force = force};
-  const IndexReport report = interruptible(
-      callback, [&](Reporter reporter) { return add_index(path, options, reporter.progress); });
-  return py::dict(py::arg("level_bytes") = report.level_bytes,
-                  py::arg("ranges_added") = report.ranges_added,
-                  py::arg("seconds") = report.seconds);
+  return describe_index(interruptible(
+      callback, [&](Reporter reporter) { return add_index(path, options, reporter.progress); }));
 }
 
 py::dict verify_store(const std::string& path, const VolumeRequest& request,

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include <isobrick/label_pieces.h>
 #include <isobrick/mesh_file_sink.h>
 #include <isobrick/mesh_sinks.h>
 #include <isobrick/open_volume.h>
@@ -13,6 +14,7 @@
 #include "python/src/bindings.h"
 #include "python/src/filtered.h"
 #include "python/src/interruptible.h"
+#include "python/src/labels.h"
 
 namespace isobrick::python {
 namespace {
@@ -65,12 +67,36 @@ py::dict merge_to_file(const std::vector<std::string>& pieces, const MeshFilterO
   return result;
 }
 
+py::dict extract_label_piece_of(const OpenedVolume& volume, LabelOptions options,
+                                std::uint32_t number, std::uint32_t count, const std::string& path,
+                                bool force, const py::object& callback) {
+  const LabelPieceReport report = interruptible(callback, [&](Reporter reporter) {
+    options.cancel = reporter.cancel;
+    return extract_label_piece(volume.store(), options, {number, count}, path, force,
+                               reporter.progress);
+  });
+  return py::dict(py::arg("vertices") = report.pass.vertices,
+                  py::arg("faces") = report.pass.triangles, py::arg("kept") = report.is_kept,
+                  py::arg("bytes") = report.bytes);
+}
+
+py::dict merge_labels(const std::vector<std::string>& pieces, std::uint64_t memory, int threads,
+                      const py::object& callback) {
+  const std::vector<std::filesystem::path> paths(pieces.begin(), pieces.end());
+  return label_meshes(callback, [&](const LabelVisitor& visit, const Reporter& reporter) {
+    merge_label_pieces(paths, {.memory = memory, .threads = threads, .cancel = reporter.cancel},
+                       visit, reporter.progress);
+  });
+}
+
 }  // namespace
 
 void bind_pieces(py::module_& module) {
   module.def("extract_piece", &extract_piece_of);
   module.def("merge_mesh", &merge_mesh);
   module.def("merge_to_file", &merge_to_file);
+  module.def("extract_label_piece", &extract_label_piece_of);
+  module.def("merge_labels", &merge_labels);
 }
 
 }  // namespace isobrick::python

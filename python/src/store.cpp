@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -23,6 +24,7 @@
 #include "python/src/bindings.h"
 #include "python/src/cancellable_sink.h"
 #include "python/src/casters.h"
+#include "python/src/colours.h"
 #include "python/src/descriptions.h"
 #include "python/src/filtered.h"
 #include "python/src/interruptible.h"
@@ -106,10 +108,11 @@ py::array_t<float> sample_points(const OpenedVolume& volume,
 
 py::dict extract_labels_of(const OpenedVolume& volume, const LabelOptions& options,
                            const py::object& callback) {
-  return label_meshes(options, callback,
-                      [&](const LabelOptions& o, const LabelVisitor& visit, Progress& progress) {
-                        extract_labels(volume.store(), o, visit, progress);
-                      });
+  return label_meshes(callback, [&](const LabelVisitor& visit, const Reporter& reporter) {
+    LabelOptions cancellable = options;
+    cancellable.cancel = reporter.cancel;
+    extract_labels(volume.store(), cancellable, visit, reporter.progress);
+  });
 }
 
 void extract_to(const OpenedVolume& volume, ExtractOptions options, MeshSink& sink,
@@ -132,19 +135,22 @@ py::dict save_mesh(const OpenedVolume& volume, ExtractOptions options,
                    const MeshFilterOptions& filters, const std::string& path,
                    const MeshFileOptions& file,
                    const std::vector<std::pair<std::string, const OpenedVolume*>>& attributes,
-                   const py::object& callback) {
+                   const ColourArguments& colour_arguments, const py::object& callback) {
+  const std::optional<AttributeColours> colours = colours_of(colour_arguments, path);
   std::vector<SampledAttribute> sampled;
   for (const auto& [name, other] : attributes) sampled.push_back({name, &other->store()});
   std::unique_ptr<MeshSink> sink;
+  std::unique_ptr<ColourSink> coloured;
   std::unique_ptr<AttributeSink> sampler;
   std::unique_ptr<MeshFilter> filter;
   const ExtractReport report = interruptible(callback, [&](Reporter reporter) {
     options.cancel = reporter.cancel;
     sink = create_mesh_file(path, file);
+    if (colours) coloured = std::make_unique<ColourSink>(*sink, *colours);
     if (!sampled.empty()) {
       const SampleOptions usual;
       sampler = std::make_unique<AttributeSink>(
-          *sink, sampled,
+          coloured ? static_cast<MeshSink&>(*coloured) : *sink, sampled,
           SampleOptions{.volume_unit = volume.store().info().levels.front().transform.unit,
                         .threads = options.threads,
                         .memory = std::min(usual.memory, options.memory / 8)});

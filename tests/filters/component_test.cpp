@@ -92,7 +92,7 @@ TEST(Components, NeedFewPages) {
   const Mesh expected = filtered(mesh, {.largest = 20}).mesh;
   Mesh result;
   MemorySink sink(result);
-  ComponentStage stage(sink, {}, {.page_bytes = 256}, 8 << 10, {.largest = 20});
+  ComponentStage<std::uint32_t> stage(sink, {}, {.page_bytes = 256}, 8 << 10, {.largest = 20});
   EXPECT_LE(stage.memory(), 8u << 10);
   write_chunks(mesh, stage, 100);
   EXPECT_TRUE(same(result, expected));

@@ -20,7 +20,7 @@ constexpr double kAnyDistance = std::numeric_limits<double>::infinity();
 
 TriangleGroup group_of(std::vector<Vec3f> positions, std::vector<Triangle> triangles) {
   TriangleGroup group;
-  for (std::uint32_t v = 0; v < positions.size(); ++v) group.vertices.push_back(v);
+  group.vertices = positions.size();
   group.positions = std::move(positions);
   group.triangles = std::move(triangles);
   return group;

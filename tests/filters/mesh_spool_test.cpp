@@ -33,7 +33,7 @@ void expect_equal(const Mesh& a, const Mesh& b) {
 TEST(MeshSpool, ReplaysWhatItTook) {
   const Mesh mesh = strip(5000);
   for (const std::uint64_t memory : {0u, 1u << 12, 1u << 24}) {
-    MeshSpool spool({.page_bytes = 256}, memory);
+    MeshSpool<std::uint32_t> spool({.page_bytes = 256}, memory);
     spool.begin({.has_normals = true});
     spool.append({0, mesh.positions.span().first(100), mesh.normals.span().first(100),
                   mesh.triangles.span().first(98)});
@@ -44,8 +44,8 @@ TEST(MeshSpool, ReplaysWhatItTook) {
     EXPECT_EQ(spool.bytes(), 5000u * 24 + 4998u * 12);
     Mesh first, second;
     MemorySink to_first(first), to_second(second);
-    spool.replay(to_first);
-    spool.replay_and_release(to_second);
+    spool.replay(to_first, false);
+    spool.replay_and_release(to_second, false);
     expect_equal(first, mesh);
     expect_equal(second, mesh);
     EXPECT_EQ(spool.size().vertices, 0u);
@@ -54,21 +54,21 @@ TEST(MeshSpool, ReplaysWhatItTook) {
 
 TEST(MeshSpool, ReplaysAMeshWithoutNormalsAndAnEmptyOne) {
   const Mesh mesh = strip(50);
-  MeshSpool spool({}, 1 << 20);
+  MeshSpool<std::uint32_t> spool({}, 1 << 20);
   spool.begin({});
   Mesh empty, replayed;
   MemorySink to_empty(empty), to_replayed(replayed);
-  spool.replay(to_empty);
+  spool.replay(to_empty, false);
   EXPECT_TRUE(empty.positions.empty());
   spool.append({0, mesh.positions.span(), {}, mesh.triangles.span()});
-  spool.replay(to_replayed);
+  spool.replay(to_replayed, false);
   EXPECT_TRUE(replayed.normals.empty());
   EXPECT_TRUE(std::ranges::equal(replayed.positions.span(), mesh.positions.span()));
 }
 
 TEST(MeshSpool, RefusesMoreVerticesThanNumbersCanName) {
-  EXPECT_NO_THROW(check_vertex_count(0xffffffff));
-  EXPECT_THROW(check_vertex_count(0x100000000), Error);
+  EXPECT_NO_THROW(check_vertex_count<std::uint32_t>(0xffffffff));
+  EXPECT_THROW(check_vertex_count<std::uint32_t>(0x100000000), Error);
 }
 
 }  // namespace

@@ -148,7 +148,7 @@ TEST(Smooth, NeedsFewPages) {
   const Mesh expected = filtered(mesh, {.smooth = 3}).mesh;
   Mesh result;
   MemorySink sink(result);
-  SmoothStage stage(sink, {}, {.page_bytes = 256}, 16 << 10, {.iterations = 3});
+  SmoothStage<std::uint32_t> stage(sink, {}, {.page_bytes = 256}, 16 << 10, {.iterations = 3});
   EXPECT_LE(stage.memory(), 16u << 10);
   write_chunks(mesh, stage, 50);
   EXPECT_TRUE(same(result, expected));

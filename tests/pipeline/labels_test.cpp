@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <random>
 #include <set>
@@ -175,6 +176,31 @@ TEST_F(Labels, NothingButVolumeLevelAndRegionShows) {
   const Meshes chosen = meshes_of(s, options);
   ASSERT_EQ(chosen.size(), 4u);
   for (const auto& [label, mesh] : chosen) EXPECT_EQ(mesh, expected.at(label)) << label;
+}
+
+TEST_F(Labels, TotalsAreKnownBeforeTheFirstMesh) {
+  const StoreReader s = store(cells<std::uint16_t>({70, 66, 50}, 40, 4));
+  LabelTotals totals;
+  int calls = 0;
+  LabelOptions options;
+  options.check_totals = [&](const LabelTotals& all) { totals = all, ++calls; };
+  LabelReport report;
+  const Meshes meshes = meshes_of(s, options, &report);
+  EXPECT_EQ(calls, 1);
+  EXPECT_EQ(totals.labels, meshes.size());
+  EXPECT_EQ(totals.size.vertices, report.vertices);
+  EXPECT_EQ(totals.size.triangles, report.triangles);
+  MeshSize largest;
+  for (const auto& [label, mesh] : meshes) {
+    largest.vertices = std::max<std::uint64_t>(largest.vertices, mesh.positions.size());
+    largest.triangles = std::max<std::uint64_t>(largest.triangles, mesh.triangles.size());
+  }
+  EXPECT_EQ(totals.largest.vertices, largest.vertices);
+  EXPECT_EQ(totals.largest.triangles, largest.triangles);
+  // What it throws comes before any mesh.
+  options.check_totals = [](const LabelTotals&) { throw Error("too many"); };
+  const auto never = [](const LabelMesh&) { ADD_FAILURE() << "a mesh was passed on"; };
+  EXPECT_THROW(extract_labels(s, options, never), Error);
 }
 
 TEST_F(Labels, SmoothMeshesDependOnNothingElseEither) {

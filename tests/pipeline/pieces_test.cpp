@@ -12,6 +12,7 @@
 #include <isobrick/convert.h>
 #include <isobrick/error.h>
 #include <isobrick/index_build.h>
+#include <isobrick/mesh_filters.h>
 #include <isobrick/mesh_sinks.h>
 #include "pipeline/pieces/merge_limit.h"
 #include "tests/pipeline/least_budget.h"
@@ -106,6 +107,23 @@ TEST_F(Pieces, OfMoreVerticesThan32BitsNumberHaveWideNumbers) {
   merge_pieces_within(limit + 1, paths, narrow, {}, no_progress());
   expect_same(narrow, expected);
   EXPECT_THROW(merge_pieces_within(limit, paths, narrow, {}, no_progress()), Error);
+}
+
+TEST_F(Pieces, OfMoreVerticesThan32BitsNumberAreFiltered) {
+  const StoreReader reader = store(busy_field<std::uint8_t>({130, 97, 110}));
+  const ExtractOptions options{.isovalue = 49.5, .normals = true};
+  const auto paths = pieces(reader, options, 3);
+  const MeshFilterOptions filters{.largest = 2, .smooth = 2, .measure = true};
+  const auto filtered = [&](std::uint64_t limit, PieceSink& sink) {
+    MeshFilter filter(sink, filters);
+    merge_pieces_within(limit, paths, filter, {}, no_progress());
+    return filter.measure()->area;
+  };
+  PieceSink expected, found;
+  const double area = filtered(kMaxNarrowVertices, expected);
+  EXPECT_EQ(filtered(100, found), area);
+  EXPECT_GT(expected.positions.size(), 1000u);
+  expect_same(found, expected);
 }
 
 TEST_F(Pieces, BecomeTheMeshOfASingleExtractionWhereSamplesAreMissing) {

@@ -115,6 +115,18 @@ def test_a_compressed_glb_is_smaller(tmp_path):
     assert (tmp_path / "c.glb").read_bytes() == (tmp_path / "a.glb").read_bytes()
 
 
+def test_compressed_tiles_are_smaller(tmp_path):
+    mesh = isobrick.extract(ball(), 1, normals=True)
+    mesh.save(tmp_path / "plain.3dtiles")
+    try:
+        mesh.save(tmp_path / "a.3dtiles", compress=True)
+    except isobrick.UsageError as error:
+        pytest.skip(str(error))  # without meshoptimizer
+    sizes = [sum(file.stat().st_size for file in (tmp_path / name).rglob("*.glb"))
+             for name in ("plain.3dtiles", "a.3dtiles")]
+    assert sizes[1] < 0.7 * sizes[0]
+
+
 def test_levels_of_detail(tmp_path):
     mesh = isobrick.extract(ball(), 1)
     try:

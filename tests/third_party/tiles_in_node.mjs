@@ -14,7 +14,9 @@ globalThis.document ??= { addEventListener() {}, createElement: () => ({}), hidd
 
 // Throws an error with the code ERR_MODULE_NOT_FOUND where the packages are not installed.
 const { Box3, PerspectiveCamera, Sphere, Triangle, Vector3 } = await import("three");
+const { MeshoptDecoder } = await import("three/addons/libs/meshopt_decoder.module.js");
 const { TilesRenderer } = await import("3d-tiles-renderer/three");
+const { GLTFExtensionsPlugin } = await import("3d-tiles-renderer/three/plugins");
 
 const pause = () => new Promise((resolve) => setTimeout(resolve, 1));
 
@@ -55,6 +57,7 @@ export async function openTiles(folder) {
   });
   await new Promise((resolve) => server.listen(0, "localhost", resolve));
   const tiles = new TilesRenderer(`http://localhost:${server.address().port}/tiles/tileset.json`);
+  tiles.registerPlugin(new GLTFExtensionsPlugin({ meshoptDecoder: MeshoptDecoder, autoDispose: false }));
   let failure = null;
   tiles.addEventListener("load-error", ({ error }) => (failure = error));
   const camera = new PerspectiveCamera(60, 1, 1, 2);

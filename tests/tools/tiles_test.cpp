@@ -155,6 +155,37 @@ TEST_F(TilesCommand, LabelsMayBeNegativeAndHaveColours) {
   EXPECT_EQ(read_file(path("flat/1/0/0_0_0.glb")).find("NORMAL"), std::string::npos);
 }
 
+TEST_F(TilesCommand, AreCompressedOnRequest) {
+#ifdef ISOBRICK_WITH_MESHOPT
+  ASSERT_EQ(run({"synth", "cells", path("c.zarr"), "--dims", "60,50,40", "--type", "u8"}).exit_code,
+            0);
+  const Arguments commands[] = {
+      extract({"-o", path("m.3dtiles")}),
+      {"extract", path("c.zarr"), "--labels", "3:9", "-o", path("m.3dtiles")}};
+  for (Arguments words : commands) {
+    ASSERT_EQ(run(words).exit_code, 0);
+    const auto plain = content("m.3dtiles");
+    words.insert(words.end(), {"--compress", "--force"});
+    const nlohmann::json made = run_json(words);
+    const auto packed = content("m.3dtiles");
+    EXPECT_EQ(
+        made.contains("surfaces") ? made["surfaces"][0]["output_bytes"] : made["output_bytes"],
+        size_of("m.3dtiles"));
+    ASSERT_EQ(packed.size(), plain.size());
+    for (std::size_t i = 0; i < packed.size(); ++i) {
+      EXPECT_EQ(packed[i].first, plain[i].first);
+      if (!packed[i].first.ends_with(".glb")) continue;
+      EXPECT_LT(packed[i].second.size(), plain[i].second.size());
+      EXPECT_NE(packed[i].second.find("EXT_meshopt_compression"), std::string::npos);
+    }
+    fs::remove_all(path("m.3dtiles"));
+  }
+#else
+  expect_refused(run(extract({"-o", path("m.3dtiles"), "--compress"})), 2, {"meshoptimizer"});
+  EXPECT_EQ(files(), (std::vector<std::string>{"a.zarr"}));
+#endif
+}
+
 TEST_F(TilesCommand, RefuseWhatMakesNoSense) {
   const auto refuse = [&](const Arguments& more, std::initializer_list<std::string> words) {
     const std::vector<std::string> before = files();
@@ -168,6 +199,7 @@ TEST_F(TilesCommand, RefuseWhatMakesNoSense) {
   refuse({"-o", output, "--levels", "many"}, {"--levels", "'many'"});
   refuse({"-o", output, "--sharded"}, {"--sharded", "neuroglancer", "3D Tiles"});
   refuse({"-o", output, "--quantize"}, {"--quantize", "GLB"});
+  refuse({"-o", path("m.neuroglancer"), "--compress"}, {"--compress", "GLB and 3D Tiles"});
   refuse({"-o", output, "--attribute", "heat=" + store_}, {"--attribute", "3D Tiles"});
   refuse({"-o", output, "--part", "1/2"}, {"--part", "3dtiles"});
   refuse({"-o", path("m.ply"), "--format", "3dtiles"}, {"m.ply"});

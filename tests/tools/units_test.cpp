@@ -150,10 +150,16 @@ TEST(Mesh, ItIsMadeOfPiecesWhereAnExtractionCannotNumberIt) {
   PlannedMesh ply = mesh, smooth = mesh, metres = mesh;
   ply.form.format = MeshFormat::ply;
   EXPECT_FALSE(needs_pieces(ply, 1000));
-  smooth.filter.smooth = 3;
-  EXPECT_FALSE(needs_pieces(smooth, 1000));
+  for (PlannedMesh* each : {&ply, &smooth}) each->filter.smooth = 3;
+  EXPECT_TRUE(needs_pieces(smooth, 1000));
+  EXPECT_FALSE(needs_pieces(ply, 1000));
   metres.filter.unit = "meter";
+  metres.filter.measure = true;
+  metres.form.format = MeshFormat::tiles3d;
   EXPECT_TRUE(needs_pieces(metres, 1000));
+  // What is left may have numbers of 32 bits.
+  ply.filter.largest = 1;
+  EXPECT_TRUE(needs_pieces(ply, 1000));
 }
 
 TEST(Space, AMeshNeedsItsScratchFileToo) {
@@ -202,6 +208,24 @@ TEST(Space, WhatIsUncertainNeedsMore) {
   const std::uint64_t sure = needed();
   mesh.uncertainty = 0.25;
   EXPECT_NEAR(static_cast<double>(needed()), 1.25 * static_cast<double>(sure), 1000);
+}
+
+TEST(Space, MeshesOfLabelsHaveHeadersAndScratchFilesOfThoseAtATime) {
+  const MeshForm ply{.format = MeshFormat::ply};
+  const MeshSize size{.vertices = 500'000, .triangles = 1'000'000};
+  const auto bytes = [&](std::uint64_t labels, MeshSize largest, int at_a_time) {
+    return predict_label_bytes(ply, {}, {labels, size, largest}, at_a_time);
+  };
+  const MeshBytes whole = predict_bytes(ply, size);
+  const MeshSize some{.vertices = 1000, .triangles = 2000};
+  EXPECT_EQ(bytes(1, size, 1), whole.needed);
+  EXPECT_EQ(bytes(1, size, 8), whole.needed);
+  EXPECT_EQ(bytes(100, some, 0), whole.file + 99 * predict_bytes(ply, {}).file);
+  EXPECT_EQ(bytes(100, some, 3), bytes(100, some, 0) + 3 * 2000 * 13);
+  MeshFilterOptions filter;
+  filter.simplify_ratio = 0.5;
+  EXPECT_EQ(predict_label_bytes(ply, filter, {100, size, some}, 3),
+            bytes(100, some, 3) + 3 * filter_scratch_bytes(filter, some, false));
 }
 
 TEST(Progress, LineHasRateAndTimeLeft) {

@@ -329,9 +329,16 @@ Bounds3f GlbVertices::store(std::span<const std::byte> rows, std::byte* to) cons
 }
 
 Bounds3f GlbVertices::append(FileWriter& out, std::span<const std::byte> rows) const {
-  const std::size_t bytes = rows.size() / float_row_bytes() * row_bytes();
-  const Bounds3f bounds = store(rows, out.reserve(bytes));
-  out.commit(bytes);
+  // Colours take more bytes stored than in rows.
+  const std::size_t most = FileWriter::kBuffer / std::max(row_bytes(), float_row_bytes());
+  Bounds3f bounds;
+  while (!rows.empty()) {
+    const std::size_t count = std::min(most, rows.size() / float_row_bytes());
+    const auto some = rows.first(count * float_row_bytes());
+    bounds.include(store(some, out.reserve(count * row_bytes())));
+    out.commit(count * row_bytes());
+    rows = rows.subspan(some.size());
+  }
   return bounds;
 }
 

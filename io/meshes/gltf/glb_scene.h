@@ -67,7 +67,7 @@ struct GlbVertices {
   Bounds3f store(std::span<const std::byte> rows, std::byte* to) const;
   /// The bounds of positions that the first of fields() holds, side by side.
   Bounds3f bounds_of_positions(std::span<const std::byte> positions) const;
-  /// Appends rows so, at most FileWriter::kBuffer bytes.
+  /// Appends rows so, any number of them.
   Bounds3f append(FileWriter& out, std::span<const std::byte> rows) const;
 };
 

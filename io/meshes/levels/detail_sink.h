@@ -7,7 +7,6 @@
 
 #include <isobrick/mesh.h>
 #include <isobrick/progress.h>
-#include "filters/mesh_spool.h"
 #include "io/meshes/levels/level_sink.h"
 #include "io/meshes/levels/level_writer.h"
 
@@ -30,6 +29,8 @@ std::uint64_t level_memory(const LevelOptions& options);
 /// Of a budget of the whole operation, what becomes LevelOptions::memory.
 std::uint64_t level_share(std::uint64_t budget);
 
+class LevelMaker;
+
 /// Makes levels of detail of a mesh, whose fragments a format encodes and writes. Level 0 is the
 /// mesh itself; each further one is the one before with a quarter of its triangles, simplified with
 /// its topology kept. Levels end early where a further one would not be clearly smaller.
@@ -38,41 +39,22 @@ std::uint64_t level_share(std::uint64_t budget);
 class DetailSink final : public LevelSink {
  public:
   DetailSink(std::unique_ptr<LevelWriter> writer, const LevelOptions& options);
+  ~DetailSink() override;
 
   Indexing indexing() const override { return Indexing::welded; }
+  bool takes_wide() const override { return true; }
   void begin(const MeshHeader& header) override;
   void write(const MeshChunk& chunk) override;
   void finish() override;
-  std::uint64_t bytes() const override { return mesh_.bytes() + writer_->bytes(); }
+  std::uint64_t bytes() const override;
   std::uint64_t memory() const override { return level_memory(options_); }
 
-  std::vector<WrittenLevel> levels() const override { return written_; }
+  std::vector<WrittenLevel> levels() const override;
 
  private:
-  /// What a mesh measures, as far as its grid depends on it.
-  struct Extent {
-    MeshBounds bounds;
-    double edge = 0;  ///< of an equilateral triangle of the mean area
-  };
-
-  MeshSpool make_spool() const;
-  void make_normals();
-  Extent measure(MeshSpool& mesh) const;
-  void choose_grid(const Extent& extent);
-  void write_level(int level, double edge);
-  /// Replaces the mesh by a simpler one; false where there is none worth a level.
-  bool simplify();
-
   std::unique_ptr<LevelWriter> writer_;
-  LevelNeeds needs_;
-  bool lacks_normals_ = false;  ///< until they are made
   LevelOptions options_;
-  ScratchPlace place_;
-  MeshSpool mesh_;
-  double error_ = 0;  ///< EncodedLevel::error
-  ChunkGrid grid_;
-  std::vector<EncodedLevel> encoded_;
-  std::vector<WrittenLevel> written_;
+  std::unique_ptr<LevelMaker> maker_;  ///< once the mesh has begun
 };
 
 }  // namespace isobrick

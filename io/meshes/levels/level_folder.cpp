@@ -22,6 +22,7 @@ class LevelMesh final : public LevelSink {
         mesh_(folder_->add_mesh(kOnlyMesh, options, {.name = output_.path().stem().string()})) {}
 
   Indexing indexing() const override { return mesh_->indexing(); }
+  bool takes_wide() const override { return mesh_->takes_wide(); }
   void begin(const MeshHeader& header) override { mesh_->begin(header); }
   void write(const MeshChunk& chunk) override { mesh_->write(chunk); }
   void finish() override {
@@ -45,7 +46,8 @@ class LevelMesh final : public LevelSink {
 
 std::unique_ptr<LevelFolder> open_level_folder(const fs::path& folder,
                                                const LevelFolderOptions& options) {
-  if (options.as_tiles) return std::make_unique<TilesFolder>(folder, options.has_labels);
+  if (options.as_tiles)
+    return std::make_unique<TilesFolder>(folder, options.has_labels, options.compress);
   return std::make_unique<NeuroglancerFolder>(folder, options.sharded);
 }
 

@@ -39,6 +39,7 @@ class LevelFolder {
 /// How a folder of levels is written.
 struct LevelFolderOptions {
   bool as_tiles = false;    ///< 3D Tiles, rather than neuroglancer's format
+  bool compress = false;    ///< 3D Tiles only: EXT_meshopt_compression
   bool sharded = false;     ///< neuroglancer's format only
   bool has_labels = false;  ///< a mesh for each, rather than the only one
 };

@@ -90,32 +90,36 @@ GridCell cell_of_key(std::uint64_t key) {
   return cell;
 }
 
-LevelFragments::LevelFragments(MeshSpool& mesh, const ChunkGrid& grid, int level,
-                               const FragmentWork& work)
+template <class Number>
+LevelFragments<Number>::LevelFragments(MeshSpool<Number>& mesh, const ChunkGrid& grid, int level,
+                                       const FragmentWork& work)
     : mesh_(mesh), grid_(grid), level_(level), work_(work), sorted_(work.place, work.memory) {
-  for_each_touched([](const Triangle&, Run& run) { ++run.end; });
+  for_each_touched([](const TriangleOf<Number>&, Run& run) { ++run.end; });
 }
 
-LatticeTriangle LevelFragments::on_lattice(const Triangle& triangle) {
+template <class Number>
+LatticeTriangle LevelFragments<Number>::on_lattice(const TriangleOf<Number>& triangle) {
   LatticeTriangle t;
   for (std::size_t corner = 0; corner < 3; ++corner)
     t[corner] = grid_.quantize(mesh_.positions()[triangle[corner]], level_);
   return t;
 }
 
-void LevelFragments::advance(std::uint64_t triangles) const {
+template <class Number>
+void LevelFragments<Number>::advance(std::uint64_t triangles) const {
   if (cancel_requested()) throw Cancelled("the operation was cancelled");
   work_.progress->advance(triangles * sizeof(Triangle));
 }
 
+template <class Number>
 template <class F>
-void LevelFragments::for_each_touched(F&& f) {
+void LevelFragments<Number>::for_each_touched(F&& f) {
   const LatticeCut cut(grid_, level_);
   GridCell last{};
   Run* run_of_last = nullptr;  // mostly it is the next one's, too
-  mesh_.triangles().for_each_run([&](std::span<const Triangle> triangles, std::uint64_t) {
+  mesh_.triangles().for_each_run([&](std::span<const TriangleOf<Number>> triangles, std::uint64_t) {
     advance(triangles.size());
-    for (const Triangle& t : triangles)
+    for (const auto& t : triangles)
       cut.for_each_fragment(on_lattice(t), [&](const GridCell& cell) {
         if (!run_of_last || cell != last) run_of_last = &runs_[z_order_key(cell)];
         last = cell;
@@ -124,13 +128,15 @@ void LevelFragments::for_each_touched(F&& f) {
   });
 }
 
-std::uint64_t LevelFragments::largest() const {
+template <class Number>
+std::uint64_t LevelFragments<Number>::largest() const {
   std::uint64_t most = 0;
   for (const auto& [key, run] : runs_) most = std::max(most, run.size());
   return most;
 }
 
-void LevelFragments::sort() {
+template <class Number>
+void LevelFragments<Number>::sort() {
   std::uint64_t end = 0;
   for (auto& [key, run] : runs_) {
     const std::uint64_t count = run.size();
@@ -138,29 +144,32 @@ void LevelFragments::sort() {
     end += count;
   }
   sorted_.resize(end);
-  for_each_touched([&](const Triangle& t, Run& run) { sorted_.edit(run.end++) = t; });
+  for_each_touched([&](const TriangleOf<Number>& t, Run& run) { sorted_.edit(run.end++) = t; });
 }
 
-LoadedTriangles LevelFragments::load(const Run& run) {
+template <class Number>
+LoadedTriangles LevelFragments<Number>::load(const Run& run) {
   LoadedTriangles loaded;
   const bool has_normals = mesh_.has_normals();
   loaded.positions.reserve(static_cast<std::size_t>(run.size()));
   if (has_normals) loaded.normals.reserve(static_cast<std::size_t>(run.size()));
-  sorted_.for_each_run(run.begin, run.end, [&](std::span<const Triangle> part, std::uint64_t) {
-    for (const Triangle& t : part) {
-      auto& corners = loaded.positions.emplace_back();
-      for (std::size_t corner = 0; corner < 3; ++corner)
-        corners[corner] = mesh_.positions()[t[corner]];
-      if (!has_normals) continue;
-      auto& normals = loaded.normals.emplace_back();
-      for (std::size_t corner = 0; corner < 3; ++corner)
-        normals[corner] = mesh_.normals()[t[corner]];
-    }
-  });
+  sorted_.for_each_run(run.begin, run.end,
+                       [&](std::span<const TriangleOf<Number>> part, std::uint64_t) {
+                         for (const auto& t : part) {
+                           auto& corners = loaded.positions.emplace_back();
+                           for (std::size_t corner = 0; corner < 3; ++corner)
+                             corners[corner] = mesh_.positions()[t[corner]];
+                           if (!has_normals) continue;
+                           auto& normals = loaded.normals.emplace_back();
+                           for (std::size_t corner = 0; corner < 3; ++corner)
+                             normals[corner] = mesh_.normals()[t[corner]];
+                         }
+                       });
   return loaded;
 }
 
-std::vector<EncodedFragment> LevelFragments::encode(LevelWriter& writer) {
+template <class Number>
+std::vector<EncodedFragment> LevelFragments<Number>::encode(LevelWriter& writer) {
   sort();
   tbb::task_arena arena(thread_count(work_.threads));
   tbb::enumerable_thread_specific<Encoder> encoders(
@@ -195,5 +204,8 @@ std::vector<EncodedFragment> LevelFragments::encode(LevelWriter& writer) {
   sorted_.release();
   return encoded;
 }
+
+template class LevelFragments<std::uint32_t>;
+template class LevelFragments<std::uint64_t>;
 
 }  // namespace isobrick

@@ -35,10 +35,12 @@ struct LoadedTriangles {
 };
 
 /// The triangles of a level's mesh, sorted by the fragments that they touch.
+template <class Number>
 class LevelFragments {
  public:
   /// `mesh` and what `work` names must outlive it.
-  LevelFragments(MeshSpool& mesh, const ChunkGrid& grid, int level, const FragmentWork& work);
+  LevelFragments(MeshSpool<Number>& mesh, const ChunkGrid& grid, int level,
+                 const FragmentWork& work);
 
   /// Triangles of the fragment with most of them.
   std::uint64_t largest() const;
@@ -62,15 +64,15 @@ class LevelFragments {
   template <class F>
   void for_each_touched(F&& f);
   void sort();
-  LatticeTriangle on_lattice(const Triangle& triangle);
+  LatticeTriangle on_lattice(const TriangleOf<Number>& triangle);
   LoadedTriangles load(const Run& run);
 
-  MeshSpool& mesh_;
+  MeshSpool<Number>& mesh_;
   ChunkGrid grid_;
   int level_;
   const FragmentWork& work_;
   std::map<std::uint64_t, Run> runs_;  ///< by the fragment's key
-  ScratchArray<Triangle> sorted_;
+  ScratchArray<TriangleOf<Number>> sorted_;
 };
 
 }  // namespace isobrick

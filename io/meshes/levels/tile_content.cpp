@@ -2,12 +2,44 @@
 
 #include <cstring>
 #include <span>
+#include <string_view>
 #include <vector>
 
 #include "core/vectors.h"
 #include "io/meshes/gltf/glb_scene.h"
+#include "io/meshes/gltf/meshopt_codec.h"
 
 namespace isobrick::inline v0 {
+namespace {
+
+void append(std::string& buffer, std::span<const std::byte> bytes) {
+  buffer.append(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+}
+
+/// The buffer of a primitive that is compressed; sets where its parts are. Triangles name vertices
+/// in their order, as the encoder wants it: FragmentWelder numbers them so.
+std::string compress(const GlbVertices& vertices, std::string_view rows,
+                     std::span<const Triangle> triangles, GlbPrimitive& primitive) {
+  std::string buffer;
+  const auto add = [&](std::span<const std::byte> bytes) {
+    primitive.compressed.push_back({buffer.size(), bytes.size()});
+    append(buffer, bytes);
+    buffer.resize((buffer.size() + 3) / 4 * 4);
+  };
+  const auto count = static_cast<std::size_t>(primitive.vertices);
+  for (const GlbField& field : vertices.fields()) {
+    std::vector<std::byte> values(count * field.bytes);
+    for (std::size_t i = 0; i < count; ++i)
+      std::memcpy(values.data() + i * field.bytes,
+                  rows.data() + i * vertices.row_bytes() + field.offset, field.bytes);
+    add(encode_rows(values, field.bytes).span());
+  }
+  add(encode_triangles(triangles, count).span());
+  return buffer;
+}
+
+}  // namespace
+
 float tile_coordinate(const FragmentPlace& place, std::size_t axis, std::uint16_t step) {
   const std::int64_t at = std::int64_t{place.cell[axis]} * ChunkGrid::kSteps + step;
   return static_cast<float>(static_cast<double>(at) * place.grid.edge_of(place.level) /
@@ -30,12 +62,14 @@ std::string tile_glb(const FragmentMesh& mesh, const FragmentPlace& place, const
   }
   GlbPrimitive primitive{.vertices = mesh.points.size(), .triangles = mesh.triangles.size()};
   primitive.vertex_bytes = primitive.vertices * vertices.row_bytes();
-  std::string buffer(static_cast<std::size_t>(primitive.bytes()), '\0');
+  std::string buffer(static_cast<std::size_t>(primitive.vertex_bytes), '\0');
   primitive.bounds =
       vertices.store(std::as_bytes(std::span(rows)), reinterpret_cast<std::byte*>(buffer.data()));
-  std::memcpy(buffer.data() + primitive.vertex_bytes, mesh.triangles.data(),
-              mesh.triangles.size() * sizeof(Triangle));
-  return glb_start(glb_json(vertices, {&primitive, 1}), primitive.bytes()) + buffer;
+  if (form.compress)
+    buffer = compress(vertices, buffer, mesh.triangles, primitive);
+  else
+    append(buffer, std::as_bytes(std::span(mesh.triangles)));
+  return glb_start(glb_json(vertices, {&primitive, 1}), buffer.size()) + buffer;
 }
 
 }  // namespace isobrick

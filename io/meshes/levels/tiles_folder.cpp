@@ -9,6 +9,7 @@
 #include "core/digits.h"
 #include "core/length_unit.h"
 #include "io/bytes/output_file.h"
+#include "io/meshes/gltf/meshopt_codec.h"
 #include "io/meshes/levels/tile_content.h"
 
 namespace isobrick::inline v0 {
@@ -55,6 +56,7 @@ class TilesFolder::Tileset final : public LevelWriter {
   Tileset(TilesFolder& folder, std::int64_t label, const MeshProperties& properties)
       : folder_(folder), label_(label), path_(folder.folder_of(label)) {
     form_.colour = properties.colour;
+    form_.compress = folder.compress_;
   }
 
   LevelNeeds needs() const override { return {.normals = true, .errors = true}; }
@@ -91,8 +93,10 @@ class TilesFolder::Tileset final : public LevelWriter {
   std::uint64_t bytes_ = 0;
 };
 
-TilesFolder::TilesFolder(fs::path folder, bool has_labels)
-    : folder_(std::move(folder)), has_labels_(has_labels) {}
+TilesFolder::TilesFolder(fs::path folder, bool has_labels, bool compress)
+    : folder_(std::move(folder)), has_labels_(has_labels), compress_(compress) {
+  if (compress) check_meshopt();
+}
 
 fs::path TilesFolder::folder_of(std::int64_t label) const {
   return has_labels_ ? folder_ / fmt::format("{}", label) : folder_;

@@ -17,7 +17,8 @@ namespace isobrick::inline v0 {
 /// level. Meshes of labels have a folder each, with a tileset that the folder's own one refers to.
 class TilesFolder final : public LevelFolder {
  public:
-  TilesFolder(std::filesystem::path folder, bool has_labels);
+  /// Throws as check_meshopt() where contents are to be compressed.
+  TilesFolder(std::filesystem::path folder, bool has_labels, bool compress);
 
   std::unique_ptr<LevelSink> add_mesh(std::int64_t label, const LevelOptions& options,
                                       const MeshProperties& properties) override;
@@ -40,7 +41,7 @@ class TilesFolder final : public LevelFolder {
   void add_entry(std::int64_t label, const Entry& entry, std::uint64_t bytes);
 
   std::filesystem::path folder_;
-  bool has_labels_;
+  bool has_labels_, compress_;
   mutable std::mutex mutex_;
   std::map<std::int64_t, Entry> entries_;
   std::uint64_t bytes_ = 0;

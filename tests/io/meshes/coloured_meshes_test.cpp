@@ -117,6 +117,26 @@ TEST(ColouredMeshes, AGlbHasThemInLinearLightOnWhite) {
             nlohmann::json({1, 1, 1, 1}));
 }
 
+TEST(ColouredMeshes, RowsThatGrowWhereTheyAreStoredAreAppended) {
+  // As many as a buffer holds before they are stored: a colour takes 4 bytes there and 8 in a file.
+  const GlbVertices vertices{.colours = true};
+  std::vector<std::byte> rows(FileWriter::kBuffer / vertices.float_row_bytes() *
+                              vertices.float_row_bytes());
+  for (std::size_t i = 0; i < rows.size(); ++i) rows[i] = static_cast<std::byte>(i * i % 61);
+  const std::size_t count = rows.size() / vertices.float_row_bytes();
+  std::vector<std::byte> expected(count * vertices.row_bytes()), found(expected.size());
+  ASSERT_GT(expected.size(), FileWriter::kBuffer);
+  const Bounds3f bounds = vertices.store(rows, expected.data());
+  FileWriter out = open_scratch_beside("-");
+  const Bounds3f appended = vertices.append(out, rows);
+  ASSERT_EQ(out.size(), expected.size());
+  out.flush();
+  out.share().read_at(0, found);
+  EXPECT_TRUE(found == expected);
+  EXPECT_EQ(appended.lo, bounds.lo);
+  EXPECT_EQ(appended.hi, bounds.hi);
+}
+
 TEST(ColouredMeshes, OfLabelsHaveANameAndAColour) {
   const TempDir dir;
   const VertexColour colour{255, 0, 188, 255};
