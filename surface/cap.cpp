@@ -7,8 +7,6 @@
 namespace isobrick::inline v0 {
 namespace {
 
-constexpr int kLast = kTileSamples - 1;
-
 /// Bits lo … hi − 1.
 constexpr std::uint64_t bits_between(Index lo, Index hi) {
   return hi <= lo ? 0 : (std::uint64_t{1} << hi) - (std::uint64_t{1} << lo);

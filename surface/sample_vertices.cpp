@@ -13,7 +13,7 @@
 namespace isobrick::inline v0 {
 namespace {
 
-constexpr int kLast = kTileSamples - 1;
+constexpr int kLastSample = kTileSamples - 1;
 
 /// The first tile in Morton order, as SampleVertex::owner, with a cell at sample `p` for which
 /// has_vertex(cell, corner) holds, where `corner` of the cell is the sample; the tile itself has
@@ -43,7 +43,8 @@ bool is_shared(const KernelContext& context, const TileShape& shape, std::uint32
   for (int axis = 0; axis < 3; ++axis) {
     const auto i = static_cast<int>(place >> 6 * axis & 63);
     if (i == 0 && !shape.first[axis]) return true;
-    if (i == kLast && context.border.hi[axis] - 1 > shape.origin[axis] + kLast) return true;
+    if (i == kLastSample && context.border.hi[axis] - 1 > shape.origin[axis] + kLastSample)
+      return true;
   }
   return false;
 }

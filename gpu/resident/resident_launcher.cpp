@@ -15,6 +15,7 @@
 #include "gpu/resident/resident_sizes.h"
 #include "gpu/search/search_kernel.h"
 #include "gpu/tile/on_samples.h"
+#include "surface/surface_extractor.h"
 #include "surface/topology_tables.h"
 #include "surface/world_map.h"
 

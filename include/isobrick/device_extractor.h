@@ -43,8 +43,9 @@ class ISOBRICK_API PendingDeviceMesh {
 /// packed bricks itself. Each isovalue then reads the blocks that it touches.
 ///
 /// Of the ExtractOptions of a surface, `isovalue`, `roi`, `inside`, `normals`, `drop_degenerate`,
-/// `topology`, `cap` and `gpu_memory` matter; `inside` is above by default, but for a store's level set; `gpu_memory`
-/// is without bound. The calling thread's current device is afterwards what it was before.
+/// `topology`, `cap` and `gpu_memory` matter; `inside` is above by default, but for a store's level
+/// set; `gpu_memory` is without bound. The calling thread's current device is afterwards what it
+/// was before.
 class ISOBRICK_API DeviceExtractor {
  public:
   struct Impl;  ///< private to the library
