@@ -222,15 +222,15 @@ TYPED_TEST(TileKernel, TheBorderIsCapped) {
   SurfaceOptions options;
   options.cap = true;
   const auto coarse = TestFixture::Fields::coarse({34, 35, 5}, 1);
-  for (const Inside inside : {Inside::above, Inside::below})
-    for (const Topology topology : {Topology::consistent, Topology::trilinear}) {
-      options.inside = inside;
-      options.topology = topology;
-      options.drop_degenerate = false;
-      compare(TestFixture::Fields::waves({67, 34, 5}), {.blocks = 3}, {mid + 0.5}, options);
-      options.drop_degenerate = true;
-      compare(coarse, {}, {mid, mid + 0.5}, options);
-    }
+  for (const auto& [inside, topology] :
+       {std::pair{Inside::above, Topology::consistent}, {Inside::below, Topology::trilinear}}) {
+    options.inside = inside;
+    options.topology = topology;
+    options.drop_degenerate = false;
+    compare(TestFixture::Fields::waves({67, 34, 5}), {.blocks = 3}, {mid + 0.5}, options);
+    options.drop_degenerate = true;
+    compare(coarse, {}, {mid}, options);
+  }
 }
 
 TYPED_TEST(TileKernel, TheCapOfARegion) {
