@@ -14,8 +14,9 @@ namespace isobrick::inline v0 {
 struct LabelList {
   static constexpr std::size_t kMaxLabels = 1024;
 
-  std::vector<std::int64_t> labels = {};  ///< ascending, each once
-  bool is_cut = false;                    ///< there are more than kMaxLabels: the item may have any
+  /// Ascending, each once. Those of u64 are the signed integers of the same bits.
+  std::vector<std::int64_t> labels = {};
+  bool is_cut = false;  ///< there are more than kMaxLabels: the item may have any
 
   /// Adds those of another item.
   void unite(const LabelList& other);

@@ -1,8 +1,6 @@
 #include "tools/extract_labels.h"
 
 #include <array>
-#include <charconv>
-#include <limits>
 #include <utility>
 
 #include <fmt/format.h>
@@ -22,17 +20,12 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::ordered_json;
 
-std::int64_t parse_label(std::string_view text) {
-  std::int64_t label = 0;
-  const auto [end, failure] = std::from_chars(text.data(), text.data() + text.size(), label);
-  if (failure == std::errc::result_out_of_range && end == text.data() + text.size())
-    throw UsageError(fmt::format("'{}' is no label of a mesh; the largest is {}", text,
-                                 std::numeric_limits<std::int64_t>::max()));
-  if (text.empty() || failure != std::errc() || end != text.data() + text.size())
-    throw UsageError(fmt::format(
-        "'{}' is no label; --labels takes all, or whole numbers and ranges such as 3,7,10:20",
-        text));
-  return label;
+Label parse_label(std::string_view text) {
+  if (const auto label = Label::parse(text)) return *label;
+  throw UsageError(fmt::format(
+      "'{}' is no label; --labels takes all, or whole numbers of 64 bits and ranges such as "
+      "3,7,10:20",
+      text));
 }
 
 LabelOutput output_of(const ExtractArguments& arguments) {
@@ -91,7 +84,7 @@ std::vector<LabelRange> parse_labels(const std::string& text) {
     const std::size_t end = std::min(text.find(',', begin), text.size());
     const std::string_view part = std::string_view(text).substr(begin, end - begin);
     const std::size_t colon = part.find(':');
-    const std::int64_t first = parse_label(part.substr(0, colon));
+    const Label first = parse_label(part.substr(0, colon));
     ranges.push_back({first, colon == part.npos ? first : parse_label(part.substr(colon + 1))});
     if (ranges.back().last < first)
       throw UsageError(fmt::format("the range of labels '{}' ends before it begins", part));

@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include "bricks/zarr/label_json.h"
 #include "tools/format.h"
 
 namespace isobrick::tools {

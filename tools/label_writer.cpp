@@ -13,6 +13,7 @@
 
 #include <isobrick/error.h>
 #include <isobrick/label_pieces.h>
+#include "bricks/zarr/label_json.h"
 #include "io/bytes/folder_output.h"
 #include "io/bytes/folder_walk.h"
 #include "io/bytes/output_file.h"
@@ -181,12 +182,11 @@ class LabelWriter {
   std::uint64_t bytes() const { return bytes_; }
 
  private:
-  std::string file_of(std::int64_t label) const {
-    return levels_ ? levels_->file_of(label)
-                   : fmt::format("{}{}", label, isobrick::extension_of(format_));
+  std::string file_of(const Label& label) const {
+    return levels_ ? levels_->file_of(label) : label.text().append(isobrick::extension_of(format_));
   }
 
-  std::unique_ptr<MeshSink> open_sink(std::int64_t label, const std::string& name) {
+  std::unique_ptr<MeshSink> open_sink(const Label& label, const std::string& name) {
     MeshProperties properties;
     if (const LabelProperties* known = find_properties(label))
       properties = {known->name, known->colour};
@@ -213,12 +213,12 @@ class LabelWriter {
   }
 
   /// What the image says of a label; null: nothing.
-  const LabelProperties* find_properties(std::int64_t label) const {
+  const LabelProperties* find_properties(const Label& label) const {
     if (!listing_.labels) return nullptr;
     const LabelTable& table = *listing_.labels;
     const auto at = std::lower_bound(
         table.begin(), table.end(), label,
-        [](const LabelProperties& p, std::int64_t value) { return p.label < value; });
+        [](const LabelProperties& p, const Label& value) { return p.label < value; });
     return at != table.end() && at->label == label ? &*at : nullptr;
   }
 

@@ -6,6 +6,7 @@
 
 #include <isobrick/sample_value.h>
 #include "bricks/storage/storage_keys.h"
+#include "bricks/zarr/label_json.h"
 
 namespace isobrick::inline v0 {
 namespace {
@@ -13,13 +14,14 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 /// The label that an entry of `colors` or `properties` is of.
-std::optional<std::int64_t> label_of(const JsonReader& entry) {
+std::optional<Label> label_of(const JsonReader& entry) {
   if (!entry.has("label-value")) return std::nullopt;
   const JsonReader json = entry.at("label-value");
-  const nlohmann::json& raw = json.raw();
-  if (raw.is_number_unsigned()) return SampleValue(raw.get<std::uint64_t>()).as_signed();
-  if (raw.is_number_integer()) return raw.get<std::int64_t>();
-  return SampleValue(json.number()).as_signed();
+  if (json.raw().is_number_integer()) return json.raw().get<Label>();
+  const SampleValue number = json.number();
+  if (const auto integer = number.as_signed()) return *integer;
+  if (const auto integer = number.as_unsigned()) return *integer;
+  return std::nullopt;
 }
 
 /// Calls f(entry, label) for each entry of a list that may be missing.
@@ -66,11 +68,11 @@ std::vector<std::string> names_in(const JsonReader& labels) {
 }  // namespace
 
 LabelTable parse_image_label(const JsonReader& image_label) {
-  std::map<std::int64_t, LabelProperties> by_label;
-  for_each_entry(image_label, "colors", [&](const JsonReader& entry, std::int64_t label) {
+  std::map<Label, LabelProperties> by_label;
+  for_each_entry(image_label, "colors", [&](const JsonReader& entry, const Label& label) {
     by_label[label].colour = parse_rgba(entry);
   });
-  for_each_entry(image_label, "properties", [&](const JsonReader& entry, std::int64_t label) {
+  for_each_entry(image_label, "properties", [&](const JsonReader& entry, const Label& label) {
     by_label[label].name = name_in(entry);
   });
   LabelTable table;

@@ -6,12 +6,14 @@
 #include <string>
 #include <vector>
 
+#include <isobrick/label.h>
+
 namespace isobrick::inline v0 {
 
 /// What an image says of one of its labels.
 struct LabelProperties {
-  std::int64_t label = 0;  ///< the samples' value
-  std::string name = {};   ///< for people; empty: none
+  Label label = 0;        ///< the samples' value
+  std::string name = {};  ///< for people; empty: none
   /// Red, green, blue and alpha in sRGB.
   std::optional<std::array<std::uint8_t, 4>> colour = {};
 

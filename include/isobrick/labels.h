@@ -9,6 +9,7 @@
 #include <vector>
 
 #include <isobrick/api.h>
+#include <isobrick/label.h>
 #include <isobrick/mesh.h>
 #include <isobrick/progress.h>
 #include <isobrick/store_reader.h>
@@ -18,8 +19,8 @@ namespace isobrick::inline v0 {
 
 /// The labels from `first` to `last`, both included.
 struct LabelRange {
-  std::int64_t first = 0;  ///< the smallest label
-  std::int64_t last = 0;   ///< the largest label
+  Label first = 0;  ///< the smallest label
+  Label last = 0;   ///< the largest label
 };
 
 /// What the meshes of all labels are together.
@@ -32,7 +33,7 @@ struct LabelTotals {
 /// Which labels of a label image get a mesh, and with what means.
 struct LabelOptions {
   std::vector<LabelRange> labels = {};  ///< none: all but `background`
-  std::int64_t background = 0;          ///< no object, unless `labels` names it
+  Label background = 0;                 ///< no object, unless `labels` names it
   int level = 0;                        ///< 0: the finest
   /// Iterations of Taubin's λ|μ smoothing, at most 6. All meshes are smoothed together, so walls
   /// still coincide, and no vertex leaves its cell.
@@ -60,7 +61,7 @@ class ISOBRICK_API LabelMesh {
  public:
   virtual ~LabelMesh() = default;
 
-  virtual std::int64_t label() const = 0;  ///< the samples' value
+  virtual Label label() const = 0;  ///< the samples' value
   /// Its place among all meshes in the order of the labels, the first is 0.
   virtual std::uint64_t index() const = 0;
   virtual MeshSize size() const = 0;  ///< vertices and triangles
@@ -95,13 +96,13 @@ struct LabelReport {
 /// objects end half a sample beyond their last one.
 ///
 /// Each mesh is a closed manifold and depends on the volume, the level and the region alone, not
-/// on the other labels that are chosen. Memory grows with the number of labels, by 400 bytes each
+/// on the other labels that are chosen. Memory grows with the number of labels, by 420 bytes each
 /// at most, and not with the meshes, which wait in a scratch file.
 ///
-/// Samples must be whole numbers; of u64 those beyond 2⁶³ − 1 have no mesh and may not be chosen,
-/// floating-point ones are 2⁵³ at most. NaN has no label. Calls `visit` with the labels in about
-/// ascending order, after the pass. Throws UsageError for a level, region or range of labels that
-/// makes no sense, a label not there, a budget too small; Error where a sample is no label.
+/// Samples must be whole numbers, floating-point ones 2⁵³ at most. NaN has no label. Calls `visit`
+/// with the labels in about ascending order, after the pass. Throws UsageError for a level, region
+/// or range of labels that makes no sense, a label not there, a budget too small; Error where a
+/// sample is no label.
 ISOBRICK_API LabelReport extract_labels(const StoreReader& store, const LabelOptions& options,
                                         const LabelVisitor& visit,
                                         Progress& progress = no_progress());

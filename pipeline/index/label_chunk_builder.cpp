@@ -13,12 +13,11 @@
 
 #include <isobrick/error.h>
 #include "core/box_union.h"
-#include "core/flat_map.h"
 #include "core/morton.h"
 #include "pipeline/index/level_index.h"
 #include "pipeline/program_memory.h"
 #include "pipeline/slab_reader.h"
-#include "surface/labels/label_piece.h"
+#include "surface/labels/label_key.h"
 #include "surface/labels/label_value.h"
 
 namespace isobrick::inline v0 {
@@ -46,7 +45,7 @@ struct ReadBox {
 template <class T>
 LabelList labels_in(const ReadBox& from, Box3 box) {
   LabelList list;
-  FlatMap<char> seen;
+  FlatMap<char, LabelKey> seen;
   std::optional<T> last;
   const T* typed = reinterpret_cast<const T*>(from.samples);
   for (Index z = box.lo.z; z < box.hi.z; ++z)
@@ -55,10 +54,10 @@ LabelList labels_in(const ReadBox& from, Box3 box) {
       for (Index x = 0; x < box.hi.x - box.lo.x; ++x) {
         if (!has_label(row[x]) || row[x] == last) continue;
         last = row[x];
-        const std::int64_t label = label_of(row[x]);
+        const Label label = label_of(row[x]);
         if (!seen.insert(label_key(label)).second) continue;
         if (list.labels.size() == LabelList::kMaxLabels) return {{}, true};
-        list.labels.push_back(label);
+        list.labels.push_back(static_cast<std::int64_t>(label.bits()));
       }
     }
   std::sort(list.labels.begin(), list.labels.end());
@@ -150,7 +149,7 @@ bool LabelChunkBuilder::Chunk::has_one_value(Int3 b) {
   constexpr double first_rounded = 0x1p53;
   if (is_wide_integer(builder_.store_.info().type) && std::abs(all.lo) >= first_rounded)
     return false;
-  list_of(b).labels = {label_of(all.lo)};
+  list_of(b).labels = {static_cast<std::int64_t>(label_of(all.lo).bits())};
   return true;
 }
 

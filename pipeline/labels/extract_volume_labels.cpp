@@ -79,7 +79,7 @@ LabelReport extract_labels(const Volume& volume, const LabelOptions& options,
                            .type = samples.lattice.type,
                            .transform = samples.transform,
                            .roi = options.roi.value_or(samples.lattice.box()),
-                           .labels = {options.labels, options.background, samples.lattice.type},
+                           .labels = {options.labels, options.background},
                            .smoothing = label_smoothing(options)};
     LabelMeshes meshes(image, {options.scratch_beside, plan.label_bytes, plan.meshes,
                                options.cancel, options.check_totals});

@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include <isobrick/error.h>
+#include "surface/labels/label_value.h"
 
 namespace isobrick::inline v0 {
 namespace {
@@ -30,8 +31,10 @@ std::uint64_t LabelListSearch::bytes(const Lattice& lattice) {
 }
 
 bool LabelListSearch::meets(const LabelList& list) const {
-  return list.is_cut || std::any_of(list.labels.begin(), list.labels.end(),
-                                    [this](std::int64_t label) { return labels_.contains(label); });
+  return list.is_cut ||
+         std::any_of(list.labels.begin(), list.labels.end(), [this](std::int64_t label) {
+           return labels_.contains(label_of_bits(static_cast<std::uint64_t>(label), lattice_.type));
+         });
 }
 
 std::vector<LabelList> LabelListSearch::read(const IndexChunk& chunk, std::size_t part,

@@ -170,7 +170,7 @@ void SpooledLabelMesh::write(MeshSink& sink) const {
         fmt::format("label {} has {} vertices, which this output cannot number: choose VTP, OBJ, "
                     "GLB or levels of detail, a filter that makes it smaller, a coarser level or "
                     "a region",
-                    chain_.label, chain_.vertices));
+                    chain_.label.text(), chain_.vertices));
   sink.begin(header);
   if (header.wide)
     write_chunks<std::uint64_t>(sink);

@@ -23,7 +23,7 @@ class SpooledLabelMesh final : public LabelMesh {
         cancel_(std::move(cancel)),
         max_narrow_vertices_(max_narrow_vertices) {}
 
-  std::int64_t label() const override { return chain_.label; }
+  Label label() const override { return chain_.label; }
   std::uint64_t index() const override { return index_; }
   MeshSize size() const override { return {chain_.vertices, 2 * chain_.quads}; }
   void write(MeshSink& sink) const override;

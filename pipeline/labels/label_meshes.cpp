@@ -43,10 +43,10 @@ void LabelMeshes::check_named(const std::vector<LabelChain>& chains) const {
     if (range.first != range.last) continue;
     const auto at = std::lower_bound(
         chains.begin(), chains.end(), range.first,
-        [](const LabelChain& chain, std::int64_t label) { return chain.label < label; });
+        [](const LabelChain& chain, const Label& label) { return chain.label < label; });
     if (at == chains.end() || at->label != range.first)
       throw UsageError(
-          fmt::format("{} has no label {}{}", image_.name, range.first,
+          fmt::format("{} has no label {}{}", image_.name, range.first.text(),
                       image_.roi != Box3{{0, 0, 0}, image_.extent} ? " in the region" : ""));
   }
 }

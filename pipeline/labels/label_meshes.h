@@ -31,7 +31,7 @@ class LabelMeshes {
 
   /// `image` must outlive it.
   LabelMeshes(const LabelImage& image, Plan plan)
-      : image_(image), plan_(std::move(plan)), spool_(plan_.scratch_beside.string()) {}
+      : image_(image), plan_(std::move(plan)), spool_(plan_.scratch_beside.string(), image.type) {}
 
   /// Pieces of tiles that follow those before in Morton order, as LabelSpool::append() takes them.
   /// Throws UsageError for more labels than there is room for.

@@ -48,7 +48,7 @@ void LabelPass::make(std::span<const TileWork> tiles, const TileSamples& samples
         std::unique_ptr<LabelTile> tile;
         if (!free_tiles_.try_pop(tile)) tile = std::make_unique<LabelTile>(image_.smoothing);
         job.packed = LabelSpool::pack(job.tile, tile->make(samples, image_.type, job.tile,
-                                                           image_.roi, [this](std::int64_t label) {
+                                                           image_.roi, [this](const Label& label) {
                                                              return image_.labels.contains(label);
                                                            }));
         free_tiles_.push(std::move(tile));

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <isobrick/error.h>
+#include "bricks/zarr/label_json.h"
 #include "pipeline/extract/mesh_header.h"
 #include "pipeline/labels/label_plan.h"
 #include "pipeline/pieces/piece_identity.h"
@@ -28,7 +29,7 @@ json properties_json(const std::optional<LabelTable>& labels) {
 }
 
 LabelProperties properties_of(const json& entry) {
-  LabelProperties properties{.label = entry.at(0).get<std::int64_t>(),
+  LabelProperties properties{.label = entry.at(0).get<Label>(),
                              .name = entry.at(1).get<std::string>()};
   if (!entry.at(2).is_null()) properties.colour = entry.at(2).get<std::array<std::uint8_t, 4>>();
   return properties;
@@ -55,12 +56,15 @@ int LabelPieceDescription::level() const { return mesh.at("samples").at("level")
 LabelImage LabelPieceDescription::image() const {
   std::vector<LabelRange> ranges;
   for (const json& range : mesh.at("labels"))
-    ranges.push_back({range.at(0).get<std::int64_t>(), range.at(1).get<std::int64_t>()});
+    ranges.push_back({range.at(0).get<Label>(), range.at(1).get<Label>()});
+  const auto type = parse_scalar_type(mesh.at("samples").at("type").get<std::string>());
+  if (!type) throw Error("the piece has samples of an unknown type");
   LabelImage image{.name = fmt::format("'{}'", name),
                    .extent = extent(),
+                   .type = *type,
                    .transform = transform_of(mesh.at("transform")),
                    .roi = box_of(mesh.at("region")),
-                   .labels = {std::move(ranges), mesh.at("background").get<std::int64_t>()}};
+                   .labels = {std::move(ranges), mesh.at("background").get<Label>()}};
   image.smoothing = label_smoothing(
       {.smooth = mesh.at("smooth").get<int>(), .pass_band = mesh.at("pass_band").get<double>()});
   check_roi(image.roi, image.extent);

@@ -8,7 +8,7 @@
 
 namespace isobrick::inline v0 {
 
-/// The least for what is known of each label: for 16,000 labels.
+/// The least for what is known of each label: for 10,000 labels.
 inline constexpr std::uint64_t kLeastForLabels = std::uint64_t{4} << 20;
 
 /// How an extraction of labels divides its memory budget.

@@ -9,8 +9,8 @@ namespace isobrick::inline v0 {
 
 /// What a tile has of one label, as it lies in files: this, then the items in their order.
 struct LabelRecord {
-  std::uint64_t tile = 0;  ///< its Morton code
-  std::int64_t label = 0;
+  std::uint64_t tile = 0;   ///< its Morton code
+  std::uint64_t label = 0;  ///< its bits
   std::uint32_t vertices = 0, foreign = 0, quads = 0;
   std::uint32_t unused = 0;
 

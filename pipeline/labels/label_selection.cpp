@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
-#include <limits>
 #include <utility>
 
 #include <fmt/format.h>
@@ -12,13 +11,12 @@
 
 namespace isobrick::inline v0 {
 
-LabelSelection::LabelSelection(std::vector<LabelRange> ranges, std::int64_t background,
-                               ScalarType type)
-    : ranges_(std::move(ranges)), background_(background), is_unsigned_(type == ScalarType::u64) {
+LabelSelection::LabelSelection(std::vector<LabelRange> ranges, const Label& background)
+    : ranges_(std::move(ranges)), background_(background) {
   for (const LabelRange& range : ranges_)
     if (range.last < range.first)
-      throw UsageError(
-          fmt::format("the range of labels {}:{} ends before it begins", range.first, range.last));
+      throw UsageError(fmt::format("the range of labels {}:{} ends before it begins",
+                                   range.first.text(), range.last.text()));
   std::sort(ranges_.begin(), ranges_.end(),
             [](const LabelRange& a, const LabelRange& b) { return a.first < b.first; });
   std::size_t kept = 0;
@@ -30,17 +28,11 @@ LabelSelection::LabelSelection(std::vector<LabelRange> ranges, std::int64_t back
   ranges_.resize(kept);
 }
 
-bool LabelSelection::contains(std::int64_t label) const {
-  if (is_unsigned_ && label < 0) {
-    if (!ranges_.empty()) return false;
-    throw Error(fmt::format(
-        "the label {} is beyond {}, the largest one of a mesh: choose others with --labels",
-        static_cast<std::uint64_t>(label), std::numeric_limits<std::int64_t>::max()));
-  }
+bool LabelSelection::contains(const Label& label) const {
   if (ranges_.empty()) return label != background_;
   const auto after =
       std::upper_bound(ranges_.begin(), ranges_.end(), label,
-                       [](std::int64_t l, const LabelRange& range) { return l < range.first; });
+                       [](const Label& l, const LabelRange& range) { return l < range.first; });
   return after != ranges_.begin() && label <= std::prev(after)->last;
 }
 

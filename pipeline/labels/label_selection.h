@@ -11,12 +11,9 @@ namespace isobrick::inline v0 {
 class LabelSelection {
  public:
   /// Throws UsageError for a range that ends before it begins.
-  LabelSelection(std::vector<LabelRange> ranges, std::int64_t background,
-                 ScalarType type = ScalarType::i64);
+  LabelSelection(std::vector<LabelRange> ranges, const Label& background);
 
-  /// `label` as label_of() returns it for a sample of the type. Throws Error for a label without a
-  /// mesh where all are chosen.
-  bool contains(std::int64_t label) const;
+  bool contains(const Label& label) const;
   /// Whether these are some labels, and not all but the background.
   bool is_some() const { return !ranges_.empty(); }
   /// Whether a label from `lo` to `hi` may be chosen, ends of surface_range().
@@ -26,8 +23,7 @@ class LabelSelection {
 
  private:
   std::vector<LabelRange> ranges_;
-  std::int64_t background_;
-  bool is_unsigned_;
+  Label background_;
 };
 
 }  // namespace isobrick

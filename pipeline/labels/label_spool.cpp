@@ -5,6 +5,7 @@
 
 #include "core/morton.h"
 #include "pipeline/labels/label_record.h"
+#include "surface/labels/label_value.h"
 
 namespace isobrick::inline v0 {
 namespace {
@@ -39,7 +40,7 @@ std::vector<std::byte> LabelSpool::pack(Int3 tile, std::span<const LabelPiece> p
   std::byte* to = packed.data();
   for (const LabelPiece& piece : pieces) {
     const LabelRecord record{.tile = morton_encode(tile),
-                             .label = piece.label,
+                             .label = piece.label.bits(),
                              .vertices = static_cast<std::uint32_t>(piece.vertices.size()),
                              .foreign = static_cast<std::uint32_t>(piece.foreign.size()),
                              .quads = static_cast<std::uint32_t>(piece.quads.size())};
@@ -59,9 +60,9 @@ void LabelSpool::append(std::span<const std::byte> packed) {
     packed = packed.subspan(bytes.size());
 
     const Int3 tile = morton_decode(record.tile);
-    const auto [chain, is_new] = chain_of_.insert(label_key(record.label));
-    if (is_new)
-      chain = {.label = record.label, .last = kNoPiece, .first_tile = tile, .last_tile = tile};
+    const Label label = label_of_bits(record.label, type_);
+    const auto [chain, is_new] = chain_of_.insert(label_key(label));
+    if (is_new) chain = {.label = label, .last = kNoPiece, .first_tile = tile, .last_tile = tile};
     const std::uint64_t previous = chain.last;
     chain.last = writer_.size();
     chain.vertices += record.vertices;
@@ -78,7 +79,7 @@ std::vector<LabelChain> LabelSpool::finish() {
   file_ = writer_.share();
   std::vector<LabelChain> chains;
   chains.reserve(chain_of_.size());
-  chain_of_.for_each([&](std::uint64_t, const LabelChain& chain) { chains.push_back(chain); });
+  chain_of_.for_each([&](const LabelKey&, const LabelChain& chain) { chains.push_back(chain); });
   std::sort(chains.begin(), chains.end(),
             [](const LabelChain& a, const LabelChain& b) { return a.label < b.label; });
   return chains;

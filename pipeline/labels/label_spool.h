@@ -7,15 +7,16 @@
 #include <vector>
 
 #include <isobrick/lattice.h>
-#include "core/flat_map.h"
+#include <isobrick/scalar.h>
 #include "io/bytes/output_file.h"
+#include "surface/labels/label_key.h"
 #include "surface/labels/label_piece.h"
 
 namespace isobrick::inline v0 {
 
 /// The pieces of one label in the spool, and what they are together.
 struct LabelChain {
-  std::int64_t label = 0;
+  Label label;
   std::uint64_t last = 0;  ///< place of the piece that was appended last
   std::uint64_t vertices = 0, quads = 0;
   Int3 first_tile, last_tile;  ///< bounds of the tiles with a piece
@@ -37,7 +38,9 @@ class LabelSpool {
   static constexpr std::uint64_t kNoPiece = ~std::uint64_t{0};
 
   /// The file lies beside `beside`; "-": in the folder of temporary files.
-  explicit LabelSpool(const std::string& beside) : writer_(open_scratch_beside(beside)) {}
+  /// Labels are of an image of this type.
+  LabelSpool(const std::string& beside, ScalarType type)
+      : type_(type), writer_(open_scratch_beside(beside)) {}
 
   /// The pieces of a tile as append() takes them: a LabelRecord with its items for each.
   /// Thread-safe.
@@ -52,15 +55,18 @@ class LabelSpool {
 
   std::uint64_t labels() const { return chain_of_.size(); }
   /// Bytes that the labels take in memory.
-  std::uint64_t memory() const { return chain_of_.size() * 4 * sizeof(LabelChain); }
+  std::uint64_t memory() const {
+    return chain_of_.size() * 4 * (sizeof(LabelKey) + sizeof(LabelChain));
+  }
   std::uint64_t bytes() const { return writer_.size(); }
   /// Bytes that the pieces of a tile take at most, packed.
   static std::uint64_t max_packed_bytes();
 
  private:
+  ScalarType type_;
   FileWriter writer_;
   File file_;
-  FlatMap<LabelChain> chain_of_;
+  FlatMap<LabelChain, LabelKey> chain_of_;
 };
 
 }  // namespace isobrick

@@ -66,7 +66,7 @@ LabelImage label_image_of(const StoreReader& store, const LabelOptions& options)
                    .type = level.lattice.type,
                    .transform = level.transform,
                    .roi = options.roi.value_or(level.lattice.box()),
-                   .labels = {options.labels, options.background, level.lattice.type},
+                   .labels = {options.labels, options.background},
                    .smoothing = label_smoothing(options)};
   check_coordinates(image.transform, image.extent, image.name);
   check_roi(image.roi, image.extent);

@@ -233,9 +233,9 @@ def label_options(
         if not chosen:
             raise UsageError("labels is empty; None stands for all labels")
         for label in chosen:
-            label = integer(label, "labels", -(2**63) + 1, 2**63 - 1)
+            label = integer(label, "labels", -(2**63), 2**64 - 1)
             options.add_labels(label, label)
-    options.background = integer(background, "background", -(2**63) + 1, 2**63 - 1)
+    options.background = integer(background, "background", -(2**63), 2**64 - 1)
     options.level = integer(level, "level", 0, 64)
     options.roi = box
     options.smooth = integer(smooth, "smooth", 0, 6)

@@ -21,9 +21,9 @@ def extract_labels(
     Parameters
     ----------
     array, spacing, origin, direction, unit, mask, nodata
-        As of `Extractor`: an array [z, y, x], also of 64-bit integers. Labels are integers of 63
-        bits, and where `mask` or `nodata` is given of 53 bits. Missing samples have no
-        label. Or a `Volume`, of which only what follows counts.
+        As of `Extractor`: an array [z, y, x], also of 64-bit integers. Where `mask` or `nodata` is
+        given labels are integers of 53 bits. Missing samples have no label. Or a `Volume`, of
+        which only what follows counts.
     labels : int or list of int, optional
         None: all but `background`.
     roi : slices [z, y, x], optional

@@ -4,8 +4,10 @@
 #include <pybind11/stl.h>
 
 #include <array>
+#include <cstdint>
 #include <string>
 
+#include <isobrick/label.h>
 #include <isobrick/scalar.h>
 #include <isobrick/vec.h>
 
@@ -60,6 +62,28 @@ struct type_caster<isobrick::Box3> {
   }
   static handle cast(isobrick::Box3 box, return_value_policy, handle) {
     return make_tuple(box.lo, box.hi).release();
+  }
+};
+
+/// Integers.
+template <>
+struct type_caster<isobrick::Label> {
+  PYBIND11_TYPE_CASTER(isobrick::Label, const_name("int"));
+
+  bool load(handle source, bool convert) {
+    make_caster<std::int64_t> with_sign;
+    make_caster<std::uint64_t> without_sign;
+    if (with_sign.load(source, convert))
+      value = cast_op<std::int64_t>(with_sign);
+    else if (without_sign.load(source, convert))
+      value = cast_op<std::uint64_t>(without_sign);
+    else
+      return false;
+    return true;
+  }
+  static handle cast(const isobrick::Label& label, return_value_policy, handle) {
+    if (const auto integer = label.as_signed()) return int_(*integer).release();
+    return int_(label.bits()).release();
   }
 };
 

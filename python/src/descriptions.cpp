@@ -48,7 +48,7 @@ py::object describe(const std::optional<LabelTable>& labels) {
       const auto& c = *properties.colour;
       entry["colour"] = py::make_tuple(c[0], c[1], c[2], c[3]);
     }
-    table[py::int_(properties.label)] = entry;
+    table[py::cast(properties.label)] = entry;
   }
   return table;
 }

@@ -6,11 +6,12 @@
 #include <utility>
 
 #include <isobrick/mesh_sinks.h>
+#include "python/src/casters.h"
 
 namespace isobrick::python {
 
 py::dict label_meshes(const py::object& callback, const MakeLabelMeshes& make) {
-  std::map<std::int64_t, std::unique_ptr<Mesh>> meshes;
+  std::map<Label, std::unique_ptr<Mesh>> meshes;
   run_interruptibly(callback, [&](Reporter reporter) {
     std::mutex mutex;
     make(
@@ -24,7 +25,7 @@ py::dict label_meshes(const py::object& callback, const MakeLabelMeshes& make) {
         reporter);
   });
   py::dict result;
-  for (auto& [label, mesh] : meshes) result[py::int_(label)] = py::cast(std::move(mesh));
+  for (auto& [label, mesh] : meshes) result[py::cast(label)] = py::cast(std::move(mesh));
   return result;
 }
 

@@ -62,7 +62,7 @@ void bind_label_options(py::module_& module) {
   py::class_<LabelOptions>(module, "LabelOptions")
       .def(py::init<>())
       .def("add_labels",
-           [](LabelOptions& o, std::int64_t first, std::int64_t last) {
+           [](LabelOptions& o, const Label& first, const Label& last) {
              o.labels.push_back({first, last});
            })
       .def_readwrite("background", &LabelOptions::background)

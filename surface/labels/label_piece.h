@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <span>
 
+#include <isobrick/label.h>
 #include <isobrick/lattice.h>
 
 namespace isobrick::inline v0 {
@@ -46,15 +47,9 @@ struct ForeignVertex {
 /// count, those of the foreign ones.
 using LabelQuad = std::array<std::uint32_t, 4>;
 
-/// The key of a label in a FlatMap, which has no room for ~0, the label −1. No label is as small as
-/// the number in its place.
-constexpr std::uint64_t label_key(std::int64_t label) {
-  return label == -1 ? std::uint64_t{1} << 63 : static_cast<std::uint64_t>(label);
-}
-
 /// What a tile has of one label.
 struct LabelPiece {
-  std::int64_t label = 0;
+  Label label;
   std::span<const LabelVertex> vertices;  ///< in the order of the cells, then of the sheets
   std::span<const ForeignVertex> foreign;
   std::span<const LabelQuad> quads;

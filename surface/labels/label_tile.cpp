@@ -69,9 +69,9 @@ std::uint64_t LabelTile::max_bytes(ScalarType type, const LabelSmoothing& smooth
   constexpr std::uint64_t per_cell =
       8 * (sizeof(Entry) + sizeof(Of<LabelVertex>) + sizeof(LabelVertex)) +
       6 * (sizeof(Of<LabelQuad>) + sizeof(LabelQuad));
-  constexpr std::uint64_t per_sample = sizeof(Id) + sizeof(std::uint32_t) + sizeof(std::int64_t) +
+  constexpr std::uint64_t per_sample = sizeof(Id) + sizeof(std::uint32_t) + sizeof(Label) +
                                        2 * sizeof(Counts) + sizeof(LabelPiece) +
-                                       4 * sizeof(std::uint64_t);
+                                       6 * sizeof(std::uint64_t);
   const LabelWindow window(smoothing.reach());
   // Vectors that grow hold twice as much as they need at most.
   return 2 * cells * per_cell + window.volume() * (size_of(type) + 2 * per_sample) +
@@ -94,14 +94,14 @@ void LabelTile::read(const TileSamples& samples, ScalarType type, Int3 tile, Box
                  {samples_.data(), window_.at(margin, margin, margin), window_.steps()[1],
                   window_.steps()[2]});
   labels_.assign(1, 0);
-  id_of_ = FlatMap<Id>();
+  id_of_ = FlatMap<Id, LabelKey>();
   visit_sample(type, [&](auto tag) { number_labels<typename decltype(tag)::type>(roi); });
   chosen_.assign(labels_.size(), 0);
   find_edges();
   find_points();
 }
 
-LabelTile::Id LabelTile::id_of(std::int64_t label) {
+LabelTile::Id LabelTile::id_of(const Label& label) {
   const auto [id, is_new] = id_of_.insert(label_key(label));
   if (is_new) {
     if (labels_.size() > std::numeric_limits<Id>::max())

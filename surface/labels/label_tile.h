@@ -8,6 +8,7 @@
 #include <isobrick/lattice.h>
 #include "core/flat_map.h"
 #include "core/tile.h"
+#include "surface/labels/label_key.h"
 #include "surface/labels/label_piece.h"
 #include "surface/labels/label_points.h"
 #include "surface/tile_samples.h"
@@ -100,7 +101,7 @@ class LabelTile {
   void read(const TileSamples& samples, ScalarType type, Int3 tile, Box3 roi);
   template <class T>
   void number_labels(Box3 roi);
-  Id id_of(std::int64_t label);
+  Id id_of(const Label& label);
   void find_edges();
   void find_points();
   void add_point(int cell);
@@ -127,9 +128,9 @@ class LabelTile {
   std::array<int, 3> lo_{}, hi_{};
   std::vector<std::byte> samples_;
   std::vector<Id> ids_;
-  std::vector<std::int64_t> labels_;  ///< by id
+  std::vector<Label> labels_;         ///< by id
   std::vector<std::uint8_t> chosen_;  ///< by id
-  FlatMap<Id> id_of_;
+  FlatMap<Id, LabelKey> id_of_;
   /// Bits x of each row (y, z): the sample differs from the next one along x, y and z.
   std::array<std::vector<std::uint64_t>, 3> differs_;
   LabelPoints points_;

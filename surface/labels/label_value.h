@@ -8,24 +8,30 @@
 #include <fmt/format.h>
 
 #include <isobrick/error.h>
+#include <isobrick/label.h>
+#include <isobrick/scalar.h>
 
 namespace isobrick::inline v0 {
 
-/// The label that a sample is; of u64 beyond 2⁶³ the negative one of the same bits. Throws Error
-/// where it is no whole number, and for the bits of −2⁶³, for which label_key() has no room.
+/// The label that a sample is. Throws Error where it is no whole number.
 template <class T>
-std::int64_t label_of(T sample) {
+Label label_of(T sample) {
   if constexpr (std::is_floating_point_v<T>) {
     constexpr T limit = T{2} / std::numeric_limits<T>::epsilon();
     if (!(std::abs(sample) <= limit) || sample != std::trunc(sample))
       throw Error(fmt::format(
           "a sample is {}, and labels are whole numbers of at most {:.0f}: this is no label image",
           sample, limit));
+    return static_cast<std::int64_t>(sample);
+  } else {
+    return sample;
   }
-  if constexpr (std::is_integral_v<T> && sizeof(T) == 8)
-    if (static_cast<std::int64_t>(sample) == std::numeric_limits<std::int64_t>::min())
-      throw Error(fmt::format("a sample is {}, which is no label", sample));
-  return static_cast<std::int64_t>(sample);
+}
+
+/// The label of an image of this type whose bits are these, as files have them.
+inline Label label_of_bits(std::uint64_t bits, ScalarType type) {
+  if (type == ScalarType::u64) return bits;
+  return static_cast<std::int64_t>(bits);
 }
 
 /// NaN has none.

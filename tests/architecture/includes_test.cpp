@@ -45,8 +45,9 @@ const std::map<std::string, Names> kMayInclude = {
 /// The room that each public header belongs to.
 const std::map<std::string, Names> kPublicHeaders = {
     {"core",
-     {"api", "downsampling", "error", "inside", "label_properties", "lattice", "pod_buffer", "part",
-      "progress", "range", "sample_value", "scalar", "selection", "transform", "vec", "version"}},
+     {"api", "downsampling", "error", "inside", "label", "label_properties", "lattice",
+      "pod_buffer", "part", "progress", "range", "sample_value", "scalar", "selection", "transform",
+      "vec", "version"}},
     {"io/volumes", {"array_view", "volume_request", "volume_source"}},
     {"io/volumes/open", {"open_source"}},
     {"io/volumes/synth", {"synth_source"}},

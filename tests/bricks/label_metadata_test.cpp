@@ -95,15 +95,18 @@ TEST(LabelMetadata, WhatIsBrokenIsNamed) {
 TEST(LabelMetadata, RoundTripOfBothVersions) {
   ImageMetadata image;
   image.levels = {{"0", {}}};
-  image.labels =
-      LabelTable{{-3, "a \"b\"", {}}, {5, "", {{1, 2, 3, 4}}}, {1LL << 53, "c", {{0, 0, 0, 255}}}};
+  image.labels = LabelTable{{-3, "a \"b\"", {}},
+                            {5, "", {{1, 2, 3, 4}}},
+                            {1LL << 53, "c", {{0, 0, 0, 255}}},
+                            {~std::uint64_t{0}, "d", {}}};
   const std::string v3 = to_json(image);
   EXPECT_EQ(parse_image_metadata(v3, "file"), image);
   EXPECT_EQ(json::parse(v3)["attributes"]["ome"]["image-label"], json::parse(R"({"version": "0.5",
               "colors": [{"label-value": 5, "rgba": [1, 2, 3, 4]},
                          {"label-value": 9007199254740992, "rgba": [0, 0, 0, 255]}],
               "properties": [{"label-value": -3, "name": "a \"b\""},
-                             {"label-value": 9007199254740992, "name": "c"}]})"));
+                             {"label-value": 9007199254740992, "name": "c"},
+                             {"label-value": 18446744073709551615, "name": "d"}]})"));
   const std::string v2 = to_zattrs(image);
   EXPECT_EQ(json::parse(v2)["image-label"]["version"], "0.4");
   EXPECT_EQ(parse_image_metadata(v3_from_zattrs(v2, "file"), "file").labels, image.labels);

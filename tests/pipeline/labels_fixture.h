@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <map>
 #include <mutex>
+#include <ostream>
 #include <random>
 #include <string>
 #include <vector>
@@ -16,6 +17,15 @@
 #include "tests/surface/mesh_topology.h"
 #include "tests/temporary_folder.h"
 
+namespace isobrick::inline v0 {
+
+/// For messages of tests.
+inline std::ostream& operator<<(std::ostream& out, const Label& label) {
+  return out << label.text();
+}
+
+}  // namespace isobrick
+
 namespace isobrick::test {
 
 /// Stores of label images, and the meshes of their labels.
@@ -24,7 +34,7 @@ class Labels : public ::testing::Test {
   template <class T>
   using Field = isobrick::testing::Field<T>;
   using Mesh = isobrick::testing::Mesh;
-  using Meshes = std::map<std::int64_t, Mesh>;
+  using Meshes = std::map<Label, Mesh>;
 
   template <class T>
   StoreReader store(const Field<T>& field, Index brick = 64,

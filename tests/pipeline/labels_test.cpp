@@ -18,7 +18,7 @@ namespace {
 
 using isobrick::testing::Field;
 using isobrick::testing::Mesh;
-using Meshes = std::map<std::int64_t, Mesh>;
+using Meshes = std::map<Label, Mesh>;
 
 template <class T>
 Field<T> noise(Int3 extent, unsigned labels, unsigned seed) {
@@ -103,7 +103,7 @@ TEST_F(Labels, WallsCoincide) {
 
 TEST_F(Labels, EnclosedVolumesAreThoseOfTheSamples) {
   const Field<std::uint16_t> field = cells<std::uint16_t>({60, 60, 60}, 25, 2);
-  std::map<std::int64_t, double> samples;
+  std::map<Label, double> samples;
   for (const std::uint16_t label : field.samples) ++samples[label];
   double sum = 0;
   for (const auto& [label, mesh] : meshes_of_all(store(field))) {
@@ -129,7 +129,7 @@ TEST_F(Labels, NeighboursAlongAnAxisBelongTogether) {
 }
 
 /// The isosurface between a label and the rest, which is larger and so in one piece on faces.
-Mesh isosurface_of(const Field<std::uint16_t>& field, std::int64_t label) {
+Mesh isosurface_of(const Field<std::uint16_t>& field, const Label& label) {
   const Field<std::uint8_t> others(field.extent + Int3{2, 2, 2}, [&](Int3 p) {
     const Int3 q = p - Int3{1, 1, 1};
     return field.box().contains(q) && field.at(q) == label ? 0.0 : 1.0;

@@ -52,10 +52,12 @@ def test_arrays_of_every_kind_give_the_same(cells, tmp_path):
         assert all(same(meshes[label], expected[label]) for label in expected)
 
 
-@pytest.mark.parametrize("dtype", ["uint64", "int64"])
-def test_labels_beyond_doubles(cells, dtype, tmp_path):
+@pytest.mark.parametrize(
+    "dtype, first", [("uint64", 2**60), ("int64", 2**60), ("uint64", 2**63), ("uint64", 2**64 - 200)]
+)
+def test_labels_beyond_doubles(cells, dtype, first, tmp_path):
     expected = isobrick.extract_labels(cells)
-    far = np.where(cells > 0, cells.astype(dtype) + 2**60, 0).astype(dtype)
+    far = np.where(cells > 0, cells.astype(dtype) + np.array(first, dtype), 0).astype(dtype)
     path = tmp_path / "far.zarr"
     isobrick.convert(far, path, brick=16, downsampling="mode")
     volume = isobrick.open(path)
@@ -63,9 +65,9 @@ def test_labels_beyond_doubles(cells, dtype, tmp_path):
     assert np.array_equal(volume[:], far)
     for source in (far, volume):
         meshes = isobrick.extract_labels(source)
-        assert list(meshes) == [label + 2**60 for label in expected]
-        assert all(same(meshes[label + 2**60], expected[label]) for label in expected)
-        assert list(isobrick.extract_labels(source, [2**60 + 7])) == [2**60 + 7]
+        assert list(meshes) == [label + first for label in expected]
+        assert all(same(meshes[label + first], expected[label]) for label in expected)
+        assert list(isobrick.extract_labels(source, [first + 7])) == [first + 7]
     with pytest.raises(isobrick.Error, match="no float64"):
         volume.extract(0.5)
 
@@ -102,12 +104,25 @@ def test_what_makes_no_sense_is_refused(cells):
         isobrick.extract_labels(cells, smooth=7)
     with pytest.raises(isobrick.Error, match="no label image"):
         isobrick.extract_labels(cells + np.float32(0.5))
-    with pytest.raises(isobrick.Error, match="18446744073709551615"):
-        isobrick.extract_labels(np.full((4, 4, 4), 2**64 - 1, "uint64"))
     with pytest.raises(isobrick.Error, match="no float64"):
         isobrick.extract_labels(np.full((4, 4, 4), 2**60 + 1), nodata=0)
     with pytest.raises(ValueError, match="labels must be at most"):
-        isobrick.extract_labels(cells, 2**63)
+        isobrick.extract_labels(cells, 2**64)
+    with pytest.raises(ValueError, match="no label 18446744073709551615"):
+        isobrick.extract_labels(cells, 2**64 - 1)
+
+
+def test_the_largest_and_the_smallest_label():
+    for dtype in ("uint64", "int64"):
+        ends = np.iinfo(dtype)
+        array = np.zeros((4, 4, 8), dtype)
+        array[..., :3], array[..., 5:] = ends.max, ends.min + 1
+        assert list(isobrick.extract_labels(array)) == [ends.min + 1, ends.max]
+        meshes = isobrick.extract_labels(array, background=ends.max)
+        assert list(meshes) == sorted([0, ends.min + 1])
+        assert list(isobrick.extract_labels(array, [ends.max])) == [ends.max]
+    array[..., 5:] = ends.min
+    assert list(isobrick.extract_labels(array)) == [-(2**63), 2**63 - 1]
 
 
 def test_label_images_are_known(tmp_path):

@@ -10,7 +10,7 @@ namespace {
 namespace fs = std::filesystem;
 
 /// What names the mesh of a folder that has no others.
-constexpr std::int64_t kOnlyMesh = 1;
+constexpr Label kOnlyMesh = 1;
 
 /// A folder with one mesh.
 class LevelMesh final : public LevelSink {

@@ -8,6 +8,7 @@
 #include <string>
 #include <string_view>
 
+#include <isobrick/label.h>
 #include "io/meshes/levels/detail_sink.h"
 
 namespace isobrick::inline v0 {
@@ -26,10 +27,10 @@ class LevelFolder {
 
   /// A sink for the mesh of a label, which has its place when it is finished. Throws UsageError for
   /// labels that the format cannot name.
-  virtual std::unique_ptr<LevelSink> add_mesh(std::int64_t label, const LevelOptions& options,
+  virtual std::unique_ptr<LevelSink> add_mesh(const Label& label, const LevelOptions& options,
                                               const MeshProperties& properties) = 0;
   /// The file of a label's mesh, within the folder; empty where it shares its files with others.
-  virtual std::string file_of(std::int64_t label) const = 0;
+  virtual std::string file_of(const Label& label) const = 0;
   /// Writes what describes the meshes. Nothing follows.
   virtual void finish() = 0;
   /// Bytes written so far; those of the output when it is finished.

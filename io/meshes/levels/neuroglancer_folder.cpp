@@ -101,13 +101,15 @@ NeuroglancerFolder::NeuroglancerFolder(fs::path folder, bool sharded)
       sharded_(sharded),
       collected_(open_scratch_beside((folder_ / kInfo).string())) {}
 
-std::unique_ptr<LevelSink> NeuroglancerFolder::add_mesh(std::int64_t label,
+std::unique_ptr<LevelSink> NeuroglancerFolder::add_mesh(const Label& label,
                                                         const LevelOptions& options,
                                                         const MeshProperties& properties) {
-  if (label < 0)
-    throw UsageError(fmt::format(
-        "neuroglancer has no negative segments such as {}: leave them out of --labels", label));
-  const auto id = static_cast<std::uint64_t>(label);
+  const auto number = label.as_unsigned();
+  if (!number)
+    throw UsageError(
+        fmt::format("neuroglancer has no negative segments such as {}: leave them out of --labels",
+                    label.text()));
+  const std::uint64_t id = *number;
   {
     const std::lock_guard lock(mutex_);
     properties_[id] = properties;
@@ -117,8 +119,8 @@ std::unique_ptr<LevelSink> NeuroglancerFolder::add_mesh(std::int64_t label,
   return std::make_unique<DetailSink>(std::make_unique<Segment>(*this, id), of_segment);
 }
 
-std::string NeuroglancerFolder::file_of(std::int64_t label) const {
-  return sharded_ ? std::string() : fmt::format("{}", label);
+std::string NeuroglancerFolder::file_of(const Label& label) const {
+  return sharded_ ? std::string() : label.text();
 }
 
 void NeuroglancerFolder::keep_unit(const std::string& unit) {

@@ -23,9 +23,9 @@ class NeuroglancerFolder final : public LevelFolder {
   /// Throws UsageError where this isobrick was built without Draco.
   NeuroglancerFolder(std::filesystem::path folder, bool sharded);
 
-  std::unique_ptr<LevelSink> add_mesh(std::int64_t label, const LevelOptions& options,
+  std::unique_ptr<LevelSink> add_mesh(const Label& label, const LevelOptions& options,
                                       const MeshProperties& properties) override;
-  std::string file_of(std::int64_t label) const override;
+  std::string file_of(const Label& label) const override;
   void finish() override;
   std::uint64_t bytes() const override;
 

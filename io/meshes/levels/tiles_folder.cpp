@@ -53,7 +53,7 @@ bool is_tileset_name(std::string_view name) {
 /// Writes the files of a mesh.
 class TilesFolder::Tileset final : public LevelWriter {
  public:
-  Tileset(TilesFolder& folder, std::int64_t label, const MeshProperties& properties)
+  Tileset(TilesFolder& folder, const Label& label, const MeshProperties& properties)
       : folder_(folder), label_(label), path_(folder.folder_of(label)) {
     form_.colour = properties.colour;
     form_.compress = folder.compress_;
@@ -86,7 +86,7 @@ class TilesFolder::Tileset final : public LevelWriter {
 
  private:
   TilesFolder& folder_;
-  std::int64_t label_;
+  Label label_;
   fs::path path_;
   TileForm form_;
   int last_level_ = -1;
@@ -98,15 +98,15 @@ TilesFolder::TilesFolder(fs::path folder, bool has_labels, bool compress)
   if (compress) check_meshopt();
 }
 
-fs::path TilesFolder::folder_of(std::int64_t label) const {
-  return has_labels_ ? folder_ / fmt::format("{}", label) : folder_;
+fs::path TilesFolder::folder_of(const Label& label) const {
+  return has_labels_ ? folder_ / label.text() : folder_;
 }
 
-std::string TilesFolder::file_of(std::int64_t label) const {
-  return has_labels_ ? fmt::format("{}/{}", label, kTileset) : std::string(kTileset);
+std::string TilesFolder::file_of(const Label& label) const {
+  return has_labels_ ? fmt::format("{}/{}", label.text(), kTileset) : std::string(kTileset);
 }
 
-std::unique_ptr<LevelSink> TilesFolder::add_mesh(std::int64_t label, const LevelOptions& options,
+std::unique_ptr<LevelSink> TilesFolder::add_mesh(const Label& label, const LevelOptions& options,
                                                  const MeshProperties& properties) {
   if (has_labels_) make_folder(folder_of(label));
   LevelOptions of_mesh = options;
@@ -114,7 +114,7 @@ std::unique_ptr<LevelSink> TilesFolder::add_mesh(std::int64_t label, const Level
   return std::make_unique<DetailSink>(std::make_unique<Tileset>(*this, label, properties), of_mesh);
 }
 
-void TilesFolder::add_entry(std::int64_t label, const Entry& entry, std::uint64_t bytes) {
+void TilesFolder::add_entry(const Label& label, const Entry& entry, std::uint64_t bytes) {
   const std::lock_guard lock(mutex_);
   entries_.emplace(label, entry);
   bytes_ += bytes;

@@ -20,9 +20,9 @@ class TilesFolder final : public LevelFolder {
   /// Throws as check_meshopt() where contents are to be compressed.
   TilesFolder(std::filesystem::path folder, bool has_labels, bool compress);
 
-  std::unique_ptr<LevelSink> add_mesh(std::int64_t label, const LevelOptions& options,
+  std::unique_ptr<LevelSink> add_mesh(const Label& label, const LevelOptions& options,
                                       const MeshProperties& properties) override;
-  std::string file_of(std::int64_t label) const override;
+  std::string file_of(const Label& label) const override;
   void finish() override;
   std::uint64_t bytes() const override;
 
@@ -37,13 +37,13 @@ class TilesFolder final : public LevelFolder {
     double error = 0;
   };
 
-  std::filesystem::path folder_of(std::int64_t label) const;
-  void add_entry(std::int64_t label, const Entry& entry, std::uint64_t bytes);
+  std::filesystem::path folder_of(const Label& label) const;
+  void add_entry(const Label& label, const Entry& entry, std::uint64_t bytes);
 
   std::filesystem::path folder_;
   bool has_labels_, compress_;
   mutable std::mutex mutex_;
-  std::map<std::int64_t, Entry> entries_;
+  std::map<Label, Entry> entries_;
   std::uint64_t bytes_ = 0;
 };
 

@@ -16,13 +16,6 @@
 namespace isobrick::inline v0 {
 namespace {
 
-std::optional<std::int64_t> parse_whole(const std::string& text) {
-  std::int64_t value = 0;
-  const char* const last = text.data() + text.size();
-  const auto [end, error] = std::from_chars(text.data(), last, value);
-  return error == std::errc{} && end == last ? std::optional(value) : std::nullopt;
-}
-
 /// "0.5 0.68 0.45": red, green and blue from 0 to 1.
 std::optional<std::array<std::uint8_t, 4>> parse_segment_colour(const std::string& text) {
   std::array<std::uint8_t, 4> colour{0, 0, 0, 255};
@@ -62,8 +55,8 @@ std::optional<LabelTable> read_slicer_segments(
     const auto field = [&](const char* key) { return pair(fmt::format("Segment{}_{}", i, key)); };
     if (field("ID").empty()) break;
     if (!table) table.emplace();
-    const auto label = parse_whole(field("LabelValue"));
-    if (!label || parse_whole(field("Layer")).value_or(0) != layer) continue;
+    const auto label = Label::parse(field("LabelValue"));
+    if (!label || Label::parse(field("Layer")).value_or(0) != layer) continue;
     table->push_back({.label = *label,
                       .name = segment_name(field("Name")),
                       .colour = parse_segment_colour(field("Color"))});
