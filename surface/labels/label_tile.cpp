@@ -69,13 +69,15 @@ std::uint64_t LabelTile::max_bytes(ScalarType type, const LabelSmoothing& smooth
   constexpr std::uint64_t per_cell =
       8 * (sizeof(Entry) + sizeof(Of<LabelVertex>) + sizeof(LabelVertex)) +
       6 * (sizeof(Of<LabelQuad>) + sizeof(LabelQuad));
-  constexpr std::uint64_t per_sample = sizeof(Id) + sizeof(std::uint32_t) + sizeof(Label) +
-                                       2 * sizeof(Counts) + sizeof(LabelPiece) +
-                                       6 * sizeof(std::uint64_t);
+  constexpr std::uint64_t per_sample = sizeof(Id) + sizeof(std::uint32_t);
+  constexpr std::uint64_t per_label = sizeof(Label) + 2 * sizeof(Counts) + sizeof(LabelPiece) +
+                                      2 * (sizeof(LabelKey) + sizeof(std::uint64_t));
   const LabelWindow window(smoothing.reach());
+  const std::uint64_t labels =
+      std::min<std::uint64_t>(window.volume(), std::numeric_limits<Id>::max());
   // Vectors that grow hold twice as much as they need at most.
   return 2 * cells * per_cell + window.volume() * (size_of(type) + 2 * per_sample) +
-         LabelPoints::max_bytes(window.edge);
+         2 * labels * per_label + LabelPoints::max_bytes(window.edge);
 }
 
 void LabelTile::read(const TileSamples& samples, ScalarType type, Int3 tile, Box3 roi) {

@@ -147,7 +147,7 @@ TEST_F(LabelPieces, AreTheSameBytesForAllMeans) {
   LabelOptions options{.smooth = 1, .memory = std::uint64_t{1} << 30, .threads = 4};
   extract_label_piece(reader, options, {2, 3}, folder_ / "a.piece");
   options.threads = 1;
-  options.memory = std::uint64_t{120} << 20;
+  options.memory = std::uint64_t{128} << 20;
   extract_label_piece(reader, options, {2, 3}, folder_ / "b.piece");
   const std::string bytes = bytes_of(folder_ / "a.piece");
   EXPECT_GT(bytes.size(), 100'000u);
