@@ -23,7 +23,7 @@ inline bool has_samples(const SurfaceOptions& options) {
   return options.drop_degenerate || options.cap;
 }
 
-/// What a kernel is told of a surface with vertices on samples, but for its memory.
+/// The parameters of a surface with vertices on samples, but for their memory.
 inline SampleParams sample_params(ScalarType type, const SurfaceOptions& options) {
   SampleParams p{};
   p.drop = options.drop_degenerate && has_coincident(type, options.isovalue);

@@ -221,7 +221,7 @@ TYPED_TEST(FarLabels, PartsAndListsMakeTheSameMeshes) {
   EXPECT_EQ(this->collect(
                 [&](const LabelVisitor& visit) { return merge_label_pieces(pieces, {}, visit); }),
             expected);
-  // Neighbours that are one double are told apart.
+  // Neighbours that are one double stay two labels.
   const Label seven = far_label<TypeParam>(7);
   const LabelOptions some{.labels = {{seven, seven}}};
   add_label_index(store.storage()->local_path(), {});
