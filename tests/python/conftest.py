@@ -15,6 +15,17 @@ def ball(shape=(40, 50, 60), radius=15.0, dtype=np.float32):
     return (radius - distance).astype(dtype)
 
 
+@pytest.fixture
+def ball_and_ramp(tmp_path):
+    """Stores: a ball's distances, and a ramp from 0 to 19 along x in another spacing."""
+    z, y, x = np.mgrid[:30, :32, :34].astype(np.float32)
+    distance = np.sqrt((x - 16) ** 2 + (y - 15) ** 2 + (z - 14) ** 2)
+    isobrick.convert(distance, tmp_path / "ball.zarr", unit="mm")
+    ramp = np.mgrid[:20, :20, :20][2].astype(np.float32)
+    isobrick.convert(ramp, tmp_path / "ramp.zarr", spacing=(2, 2, 2), unit="mm")
+    return isobrick.open(tmp_path / "ball.zarr"), isobrick.open(tmp_path / "ramp.zarr")
+
+
 def signed_volume(vertices, faces):
     a, b, c = (vertices[faces[:, i]].astype(float) for i in range(3))
     return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6)

@@ -8,19 +8,8 @@ import pytest
 import isobrick
 
 
-@pytest.fixture
-def stores(tmp_path):
-    """A ball's distances, and a ramp along x in another spacing."""
-    z, y, x = np.mgrid[:30, :32, :34].astype(np.float32)
-    distance = np.sqrt((x - 16) ** 2 + (y - 15) ** 2 + (z - 14) ** 2)
-    isobrick.convert(distance, tmp_path / "ball.zarr", unit="mm")
-    ramp = np.mgrid[:20, :20, :20][2].astype(np.float32)
-    isobrick.convert(ramp, tmp_path / "ramp.zarr", spacing=(2, 2, 2), unit="mm")
-    return isobrick.open(tmp_path / "ball.zarr"), isobrick.open(tmp_path / "ramp.zarr")
-
-
-def test_are_samples_at_the_vertices(stores, tmp_path):
-    ball, ramp = stores
+def test_are_samples_at_the_vertices(ball_and_ramp, tmp_path):
+    ball, ramp = ball_and_ramp
     mesh = ball.extract(9.5, attributes={"ramp": ramp, "Itself": tmp_path / "ball.zarr"})
     assert list(mesh.attributes) == ["ramp", "Itself"]
     assert "ramp" in repr(mesh)
@@ -36,8 +25,8 @@ def test_are_samples_at_the_vertices(stores, tmp_path):
 
 
 @pytest.mark.parametrize("extension", ["ply", "glb", "vtp"])
-def test_a_file_is_that_of_the_stream(stores, tmp_path, extension):
-    ball, ramp = stores
+def test_a_file_is_that_of_the_stream(ball_and_ramp, tmp_path, extension):
+    ball, ramp = ball_and_ramp
     others = {"ramp": ramp, "Itself": ball}
     mesh = ball.extract(9.5, normals=True, attributes=others)
     mesh.save(tmp_path / f"a.{extension}")
@@ -52,8 +41,8 @@ def test_a_file_is_that_of_the_stream(stores, tmp_path, extension):
     assert 8 * len(mesh.vertices) <= more <= 8 * len(mesh.vertices) + 1000
 
 
-def test_the_values_of_a_ply_are_those_of_the_mesh(stores, tmp_path):
-    ball, ramp = stores
+def test_the_values_of_a_ply_are_those_of_the_mesh(ball_and_ramp, tmp_path):
+    ball, ramp = ball_and_ramp
     mesh = ball.extract(9.5, attributes={"ramp": ramp})
     mesh.attributes["own"] = np.arange(len(mesh.vertices))
     mesh.attributes["ramp"][3] = np.nan
@@ -65,8 +54,8 @@ def test_the_values_of_a_ply_are_those_of_the_mesh(stores, tmp_path):
     assert np.array_equal(rows[:, 4], np.arange(len(mesh.vertices)))
 
 
-def test_stay_with_the_mesh(stores):
-    ball, ramp = stores
+def test_stay_with_the_mesh(ball_and_ramp):
+    ball, ramp = ball_and_ramp
     mesh = ball.extract(9.5, attributes={"ramp": ramp})
     again = pickle.loads(pickle.dumps(mesh))
     assert np.array_equal(again.attributes["ramp"], mesh.attributes["ramp"])
@@ -75,16 +64,16 @@ def test_stay_with_the_mesh(stores):
     assert made.attributes["one"].dtype == np.float32
 
 
-def test_go_to_vtk(stores):
+def test_go_to_vtk(ball_and_ramp):
     pytest.importorskip("vtkmodules")
-    ball, ramp = stores
+    ball, ramp = ball_and_ramp
     mesh = ball.extract(9.5, attributes={"ramp": ramp})
     array = mesh.to_vtk().GetPointData().GetArray("ramp")
     assert array.GetTuple1(7) == mesh.attributes["ramp"][7]
 
 
-def test_bad_ones_are_refused(stores, tmp_path):
-    ball, ramp = stores
+def test_bad_ones_are_refused(ball_and_ramp, tmp_path):
+    ball, ramp = ball_and_ramp
     for name in ("x", "2p", "a b", ""):
         with pytest.raises(isobrick.UsageError, match="no name of an attribute"):
             ball.extract(9.5, attributes={name: ramp})

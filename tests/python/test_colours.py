@@ -9,17 +9,6 @@ import pytest
 import isobrick
 
 
-@pytest.fixture
-def volumes(tmp_path):
-    """A ball's distances, and a ramp from 0 to 19 along x."""
-    z, y, x = np.mgrid[:30, :32, :34].astype(np.float32)
-    distance = np.sqrt((x - 16) ** 2 + (y - 15) ** 2 + (z - 14) ** 2)
-    isobrick.convert(distance, tmp_path / "ball.zarr", unit="mm")
-    ramp = np.mgrid[:20, :20, :20][2].astype(np.float32)
-    isobrick.convert(ramp, tmp_path / "ramp.zarr", spacing=(2, 2, 2), unit="mm")
-    return isobrick.open(tmp_path / "ball.zarr"), isobrick.open(tmp_path / "ramp.zarr")
-
-
 def colours_of(path):
     """Colours (N, 3) uint8 of the vertices of a PLY."""
     content = path.read_bytes()
@@ -39,8 +28,8 @@ def colours_of(path):
 VIRIDIS = (68, 1, 84), (253, 231, 37)  # its ends
 
 
-def test_reach_over_the_values_of_a_mesh(volumes, tmp_path):
-    ball, ramp = volumes
+def test_reach_over_the_values_of_a_mesh(ball_and_ramp, tmp_path):
+    ball, ramp = ball_and_ramp
     mesh = ball.extract(9.5, attributes={"ramp": ramp})
     values = mesh.attributes["ramp"]
     values[3] = np.nan
@@ -61,8 +50,8 @@ def test_reach_over_the_values_of_a_mesh(volumes, tmp_path):
 
 
 @pytest.mark.parametrize("extension", ["ply", "glb"])
-def test_a_stream_reaches_over_the_volume(volumes, tmp_path, extension):
-    ball, ramp = volumes
+def test_a_stream_reaches_over_the_volume(ball_and_ramp, tmp_path, extension):
+    ball, ramp = ball_and_ramp
     others = {"ramp": ramp}
     a, b = tmp_path / f"a.{extension}", tmp_path / f"b.{extension}"
     ball.save_mesh(a, 9.5, attributes=others, colour_by="ramp", colour_map="coolwarm")
@@ -73,8 +62,8 @@ def test_a_stream_reaches_over_the_volume(volumes, tmp_path, extension):
     assert a.read_bytes() != b.read_bytes()
 
 
-def test_a_glb_has_them_beside_the_attribute(volumes, tmp_path):
-    ball, ramp = volumes
+def test_a_glb_has_them_beside_the_attribute(ball_and_ramp, tmp_path):
+    ball, ramp = ball_and_ramp
     ball.save_mesh(tmp_path / "a.glb", 9.5, attributes={"ramp": ramp}, colour_by="ramp")
     content = (tmp_path / "a.glb").read_bytes()
     scene = json.loads(content[20:20 + struct.unpack("<I", content[12:16])[0]])
@@ -82,8 +71,8 @@ def test_a_glb_has_them_beside_the_attribute(volumes, tmp_path):
     assert set(attributes) == {"POSITION", "_RAMP", "COLOR_0"}
 
 
-def test_what_makes_no_sense_is_refused(volumes, tmp_path):
-    ball, ramp = volumes
+def test_what_makes_no_sense_is_refused(ball_and_ramp, tmp_path):
+    ball, ramp = ball_and_ramp
     mesh = ball.extract(9.5, attributes={"ramp": ramp, "Itself": ball})
     mesh.attributes["flat"] = np.full(len(mesh.vertices), 7)
     mesh.attributes["unknown"] = np.full(len(mesh.vertices), np.nan)
