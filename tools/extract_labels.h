@@ -4,6 +4,7 @@
 #include <vector>
 
 #include <isobrick/labels.h>
+#include "ranks/ranks.h"
 #include "tools/console.h"
 #include "tools/extract_plan.h"
 #include "tools/label_writer.h"
